@@ -1,0 +1,63 @@
+# `make` or `make help` lists the verbs. All of them work on a fresh checkout: what they need is installed
+# into .venv, which needs python3 (3.11 or later); what they run needs a C compiler.
+
+PYTHON  ?= python3
+WORKERS ?= 2
+OUT     ?= reproduction
+
+BIN    := .venv/bin
+# Byte code is left to the first import, which halves the time of the installation. The warnings silenced
+# here are setuptools' about our editable mode.
+PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-build-isolation
+SHIPPED = $(shell find model codegen runner generated -type f -not -name '*.pyc' | LC_ALL=C sort)
+
+.DEFAULT_GOAL := help
+.PHONY: help install reproduce test test-full lint format bench clean FORCE
+
+help: ## list the verbs
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
+
+install: .venv/installed ## springline and all development tools in .venv, editable
+
+reproduce: .venv/installed ## regenerate the C, then the paper's runs, tables, figures and claims in OUT=reproduction
+	$(BIN)/springline generate
+	$(BIN)/springline reproduce -o $(OUT)
+
+test: .venv/installed ## the tests, WORKERS=2 at a time; lists what was skipped and why
+	$(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs
+
+test-full: .venv/installed ## the tests with those that take minutes
+	$(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs -m 'full or not full'
+
+lint: .venv/installed ## ruff and mypy
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+format: .venv/installed ## let ruff put the code in order
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+bench: .venv/installed ## side by side with what one would use instead
+	$(PIP) --editable '.[bench]'
+	$(BIN)/springline bench
+
+clean: ## remove what the other verbs made; results in OUT stay
+	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The dependencies change with pyproject.toml. The package itself is linked file by file, so it is installed
+# anew when a file comes or goes; no network is needed for that.
+.venv/dependencies: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "springline needs Python 3.11 or later: make PYTHON=python3.11")'
+	$(PYTHON) -m venv .venv
+	$(PIP) --upgrade pip 'setuptools>=77'
+	$(PIP) --editable '.[dev]'
+	@touch $@
+
+.venv/files: .venv/dependencies FORCE
+	@printf '%s\n' $(SHIPPED) | cmp -s - $@ || printf '%s\n' $(SHIPPED) > $@
+
+.venv/installed: .venv/dependencies .venv/files
+	$(PIP) --no-deps --editable .
+	@touch $@

@@ -1,0 +1,311 @@
+"""Folders of generated files: what springline wrote there, whether it is stale, and what may be replaced.
+
+``manifest.json`` lists every file of the folder with its SHA-256. A file may be replaced or removed only if
+it is still as the manifest says, so nobody's work is ever overwritten unasked.
+"""
+
+import contextlib
+import hashlib
+import json
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal, NamedTuple
+
+MANIFEST = "manifest.json"
+
+
+class FolderConflict(Exception):
+    """Files that springline did not write, or that were edited since, are in the way."""
+
+    def __init__(self, folder: Path, reasons: Mapping[str, str], *, force_helps: bool) -> None:
+        self.folder = folder
+        self.paths = tuple(sorted(reasons))
+        remedy = "move them away or choose another folder" + (", or use --force" if force_helps else "")
+        lines = (f"  {path}: {reasons[path]}" for path in self.paths)
+        super().__init__("\n".join([f"nothing was written to {folder}, for in the way are", *lines, remedy]))
+
+
+class Stale(NamedTuple):
+    """One difference between a folder and what would be written to it now.
+
+    missing  is not there                      changed  is as it was written, but would be written differently
+    extra    would no longer be written        edited   is not as it was written, nor as it would be
+    """
+
+    path: str
+    kind: Literal["missing", "changed", "extra", "edited"]
+    detail: str
+
+
+class Changes(NamedTuple):
+    """The paths that a write has written or removed; files that were right already are not touched."""
+
+    written: tuple[str, ...]
+    removed: tuple[str, ...]
+
+
+def canonical_json(value: object) -> bytes:
+    """UTF-8 JSON with sorted keys, shortest floats that read back exactly, and infinity as ``"inf"``.
+
+    Raises ValueError for NaN, which no manifest has a use for, and TypeError for what JSON cannot hold.
+    """
+    text = json.dumps(_plain(value), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    return (text + "\n").encode()
+
+
+def write_tree(
+    folder: Path, files: Mapping[str, bytes], manifest: Mapping[str, object], *, force: bool = False
+) -> Changes:
+    """Make `folder` hold exactly `files` of those that springline writes, and a manifest that lists them.
+
+    files     path inside the folder (``/`` between parts) -> content
+    manifest  what the manifest says beside the list of files, which is added under ``files``
+    force     replace and remove edited and foreign files that are in the way too
+
+    All or nothing: conflicts are looked for before anything is written, everything is prepared in a temporary
+    folder, and if moving it into place fails then what was there is put back. Files that springline does not
+    write stay where they are.
+
+    Raises FolderConflict, ValueError for an impossible path, OSError if the disk refuses.
+    """
+    new = _with_manifest(files, manifest)
+    listed = _listed(folder)
+    removals = sorted(path for path in listed or {} if path not in new and _content(folder, path) is not None)
+    _refuse_conflicts(folder, new, removals, listed, force=force)
+    writes = [path for path, content in new.items() if _content(folder, path) != content]
+    if writes or removals:
+        _replace(folder, {path: new[path] for path in writes}, removals)
+    return Changes(tuple(writes), tuple(removals))
+
+
+def check_tree(folder: Path, files: Mapping[str, bytes], manifest: Mapping[str, object]) -> list[Stale]:
+    """What ``write_tree`` with these arguments would find to change; empty if the folder is up to date.
+
+    Writes nothing. Raises ValueError for an impossible path.
+    """
+    new = _with_manifest(files, manifest)
+    listed = _listed(folder) or {}
+    stale = []
+    for path, content in new.items():
+        old = _content(folder, path)
+        if old == content:
+            continue
+        if old is None:
+            stale.append(Stale(path, "missing", "is not there"))
+        elif path == MANIFEST:
+            stale.append(Stale(path, "changed", _manifest_difference(old, content)))
+        elif _sha256(old) == listed.get(path):
+            stale.append(Stale(path, "changed", _line_difference(old, content)))
+        else:
+            reason = "edited since it was written" if path in listed else "not written by springline"
+            stale.append(Stale(path, "edited", reason))
+    extra = (path for path in listed if path not in new and _content(folder, path) is not None)
+    stale.extend(Stale(path, "extra", "would no longer be written") for path in extra)
+    return sorted(stale)
+
+
+def summary(folder: Path, stale: Sequence[Stale]) -> str:
+    """What check_tree found, as text for a person: one line a file."""
+    if not stale:
+        return f"{folder} is up to date"
+    lines = (f"  {entry.kind:8}{entry.path}: {entry.detail}" for entry in stale)
+    return "\n".join([f"{folder} is stale:", *lines])
+
+
+# --- what is there, and what may go ----------------------------------------------------------------------
+
+
+def _with_manifest(files: Mapping[str, bytes], manifest: Mapping[str, object]) -> dict[str, bytes]:
+    """All files to write, sorted by path, the manifest last."""
+    for path in files:
+        if not _stays_inside(path) or path == MANIFEST:
+            raise ValueError(f"{path!r} is no path for a generated file")
+        for parent in PurePosixPath(path).parents:
+            if str(parent) in files:
+                raise ValueError(f"{str(parent)!r} cannot be a file and the folder of {path!r}")
+    ordered = dict(sorted(files.items()))
+    entries = [{"path": path, "sha256": _sha256(content)} for path, content in ordered.items()]
+    return ordered | {MANIFEST: canonical_json({**manifest, "files": entries})}
+
+
+def _listed(folder: Path) -> dict[str, str] | None:
+    """Path -> SHA-256 as the folder's manifest lists them; None if it has none, or one that is not ours."""
+    content = _content(folder, MANIFEST)
+    if content is None:
+        return None
+    try:
+        listed = {entry["path"]: entry["sha256"] for entry in json.loads(content)["files"]}
+    except (ValueError, KeyError, TypeError):
+        return None
+    # A manifest may come from elsewhere, and what it lists may be removed: no path of it leads outside.
+    return listed if all(isinstance(path, str) and _stays_inside(path) for path in listed) else None
+
+
+def _refuse_conflicts(
+    folder: Path,
+    new: Mapping[str, bytes],
+    removals: Sequence[str],
+    listed: Mapping[str, str] | None,
+    *,
+    force: bool,
+) -> None:
+    obstacles = {}  # no file: springline never removes folders or links, asked or not
+    foreign = {}
+    for path in (*new, *removals):
+        obstacle = _obstacle(folder, path)
+        old = _content(folder, path)
+        if obstacle:
+            obstacles[obstacle] = "is a link, or a folder where a file belongs, or the reverse"
+        elif old is None or old == new.get(path):
+            continue
+        elif path == MANIFEST:
+            if listed is None:
+                foreign[path] = "not written by springline"
+        elif path not in (listed or {}):
+            foreign[path] = "not written by springline"
+        elif listed and _sha256(old) != listed[path]:
+            foreign[path] = "edited since springline wrote it"
+    if obstacles:
+        raise FolderConflict(folder, obstacles | foreign, force_helps=False)
+    if foreign and not force:
+        raise FolderConflict(folder, foreign, force_helps=True)
+
+
+def _obstacle(folder: Path, path: str) -> str | None:
+    """What keeps `path` from being a regular file below real folders, if anything does."""
+    if folder.exists() and not folder.is_dir():
+        return "."
+    parts = PurePosixPath(path).parts
+    for depth in range(1, len(parts) + 1):
+        place = folder.joinpath(*parts[:depth])
+        wanted = place.is_file() if depth == len(parts) else place.is_dir()
+        if place.is_symlink() or (place.exists() and not wanted):
+            return "/".join(parts[:depth])
+    return None
+
+
+def _content(folder: Path, path: str) -> bytes | None:
+    place = folder / path
+    return place.read_bytes() if place.is_file() else None
+
+
+def _stays_inside(path: str) -> bool:
+    pure = PurePosixPath(path)
+    return str(pure) == path and path != "." and not pure.is_absolute() and ".." not in pure.parts
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+# --- replacing -------------------------------------------------------------------------------------------
+
+
+def _replace(folder: Path, writes: Mapping[str, bytes], removals: Sequence[str]) -> None:
+    """Move new files in and old ones out, or leave all as it was. The manifest, last in `writes`, comes last.
+
+    A process killed half-way leaves files that are old or new as a whole; the next write accepts both.
+    """
+    folder = folder.resolve()
+    with contextlib.ExitStack() as undo:
+        for place in (*reversed(folder.parents), folder):
+            _make_folder(place, undo)
+        # Inside the folder, for only there is it surely the same file system (the folder may be a mount).
+        work = Path(tempfile.mkdtemp(prefix=".springline-", dir=folder))
+        undo.callback(shutil.rmtree, work)
+        prepared, replaced = work / "new", work / "old"
+        for path, content in writes.items():
+            (prepared / path).parent.mkdir(parents=True, exist_ok=True)
+            with (prepared / path).open("wb") as stream:
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
+        for path in (*removals, *writes):
+            target, old = folder / path, replaced / path
+            for inner in reversed(PurePosixPath(path).parents):
+                _make_folder(folder / inner, undo)
+            if target.exists():
+                old.parent.mkdir(parents=True, exist_ok=True)
+                os.replace(target, old)
+                undo.callback(os.replace, old, target)
+            if path in writes:
+                os.replace(prepared / path, target)
+                undo.callback(target.unlink)
+        undo.pop_all()
+    shutil.rmtree(work)
+    _remove_empty_folders(folder, removals)
+
+
+def _make_folder(place: Path, undo: contextlib.ExitStack) -> None:
+    if not place.is_dir():
+        place.mkdir()
+        undo.callback(place.rmdir)
+
+
+def _remove_empty_folders(folder: Path, removals: Sequence[str]) -> None:
+    for path in removals:
+        for inner in PurePosixPath(path).parents[:-1]:
+            place = folder / inner
+            if place.is_dir() and not any(place.iterdir()):
+                place.rmdir()
+
+
+# --- words -----------------------------------------------------------------------------------------------
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return value
+
+
+def _line_difference(old: bytes, new: bytes) -> str:
+    old_lines, new_lines = old.splitlines(), new.splitlines()
+    different = sum(a != b for a, b in zip(old_lines, new_lines, strict=False))
+    different += abs(len(old_lines) - len(new_lines))
+    return f"{different} of {len(new_lines)} lines would change"
+
+
+def _manifest_difference(old: bytes, new: bytes) -> str:
+    """Which entries of the manifest differ, named by keys and by the ``name`` of list items."""
+    try:
+        found = [text for text in _differences(json.loads(old), json.loads(new)) if text]
+    except ValueError:
+        return "is no JSON"
+    shown = found[:5] + ([f"and {len(found) - 5} more"] if len(found) > 5 else [])
+    return "; ".join(shown) or "is written in another form"
+
+
+def _differences(old: Any, new: Any, where: str = "") -> Iterator[str]:
+    if old == new:
+        return
+    old, new = _by_name(old), _by_name(new)
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in sorted(old.keys() | new.keys()):
+            if not where and key == "files":  # each stale file has a line of its own
+                continue
+            inner = f"{where}.{key}" if where else key
+            if key not in old:
+                yield f"{inner} is new"
+            elif key not in new:
+                yield f"{inner} is gone"
+            else:
+                yield from _differences(old[key], new[key], inner)
+    else:
+        old_text, new_text = json.dumps(old), json.dumps(new)
+        short = len(old_text) + len(new_text) < 80
+        yield f"{where} {old_text} -> {new_text}" if short else f"{where} differs"
+
+
+def _by_name(value: Any) -> Any:
+    if isinstance(value, list) and value and all(isinstance(item, dict) and "name" in item for item in value):
+        return {item["name"]: item for item in value}
+    return value

@@ -1,0 +1,338 @@
+/*
+ * loop.c - fixed-step simulation of a pack of runs; compiled together with its kernel.
+ *
+ * A pack is SL_G groups of SL_W lanes, a lane is one run. "kernel.h" comes from a generator and provides
+ *   sizes        SL_W SL_G; SL_NJ joints, SL_NX states, SL_NB base coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV
+ *                (values bound once per run; once per time and the same for all runs; once per time and run),
+ *                SL_ND, SL_NTABLES, SL_TABLE_CHANNELS; SL_SAMPLED 0 or 1
+ *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals
+ *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
+ * Times are t = start + (j / 2) h for half steps j, never accumulated.
+ */
+#include <float.h>
+#include <stddef.h>
+
+#include "kernel.h"
+#include "metrics.h"
+#include "simulate.h"
+
+enum {
+  SL_PACK = SL_W * SL_G,
+  SL_NMETRICS = SL_NJ * SL_METRICS_PER_JOINT,
+  SL_BLOCK = SL_W > 2 ? SL_W : 2, /* half steps whose uniform signals are evaluated together */
+  SL_NCOLUMNS = 1 + 8 * SL_NJ + SL_NB
+};
+
+/* ---- signals ------------------------------------------------------------------------------------------- */
+
+/* Table data at time t: per table tau and four coefficients a channel, into d[0], d[stride], ... */
+static void table_data(const sl_table *tables, double t, double *d, int stride) {
+  int i;
+  for (i = 0; i < SL_NTABLES; i++) {
+    const sl_table *table = &tables[i];
+    const double span = (double)table->intervals * table->dt;
+    const double *coefficients;
+    double since = t - table->t0;
+    int64_t k, c;
+    if (table->periodic) since = since - span * sl_floor(since / span);
+    since = sl_fmin(sl_fmax(since, 0.0), span);
+    k = (int64_t)sl_floor(since / table->dt);
+    if (k >= table->intervals) k = table->intervals - 1;
+    coefficients = table->coefficients + 4 * table->channels * k;
+    *d = since - (double)k * table->dt;
+    d += stride;
+    for (c = 0; c < 4 * table->channels; c++, d += stride) *d = coefficients[c];
+  }
+}
+
+typedef struct {
+  const sl_job *job;
+  sl_v uniform[2][SL_BLOCK / SL_W][SL_NU + 1]; /* two blocks of half steps, a lane each */
+  int64_t block[2];                            /* which blocks are held */
+} sl_clock;
+
+static double half_step_time(const sl_job *job, int64_t j) { return job->start_time + (0.5 * (double)j) * job->step; }
+
+/* Uniform signals at half step j: SL_NU values, SL_W doubles apart. */
+static const double *uniform_at(sl_clock *clock, int64_t j) {
+  const int64_t block = j / SL_BLOCK;
+  const int slot = (int)(block & 1), lane = (int)(j % SL_BLOCK);
+  if (SL_NU > 0 && clock->block[slot] != block) {
+    int part, i;
+    for (part = 0; part < SL_BLOCK / SL_W; part++) {
+      double t[SL_W], d[SL_W * (SL_ND + 1)];
+      for (i = 0; i < SL_W; i++) {
+        t[i] = half_step_time(clock->job, block * SL_BLOCK + part * SL_W + i);
+        table_data(clock->job->tables, t[i], d + i, SL_W);
+      }
+      kernel_uniform(t, d, clock->uniform[slot][part]);
+    }
+    clock->block[slot] = block;
+  }
+  return (const double *)clock->uniform[slot][lane / SL_W] + lane % SL_W;
+}
+
+/* ---- a pack of runs ------------------------------------------------------------------------------------ */
+
+typedef struct {
+  const sl_job *job;
+  int64_t run[SL_PACK];            /* which run a lane is; the last pack repeats its last run */
+  int lanes;                       /* lanes that count */
+  int live;                        /* of these, still running */
+  unsigned char alive[SL_PACK];
+  sl_group p[SL_NP + 1], r[SL_NR + 1];
+  sl_group x[SL_NX], u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
+  sl_group varying[3][SL_NV + 1];
+  sl_metrics metrics[SL_NJ][SL_G];
+  sl_clock clock;
+} sl_pack;
+
+static double lane_of(const sl_v *group, int lane) { return slv_get(group[lane / SL_W], lane % SL_W); }
+
+static void set_lane(sl_v *group, int lane, double value) {
+  group[lane / SL_W] = slv_put(group[lane / SL_W], lane % SL_W, value);
+}
+
+static sl_time time_at(sl_pack *pack, int64_t j, sl_group *varying) {
+  sl_time now;
+  now.uniform = uniform_at(&pack->clock, j);
+  now.varying = (const sl_group *)varying;
+  if (SL_NV > 0) {
+    double d[SL_ND + 1];
+    const double t = half_step_time(pack->job, j);
+    table_data(pack->job->tables, t, d, 1);
+    kernel_varying(t, d, now.uniform, (const sl_group *)pack->p, (const sl_group *)pack->r, varying);
+  }
+  return now;
+}
+
+/* A trajectory row at step k for each living lane from `lane` to `end`-1. */
+static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) {
+  const sl_job *job = pack->job;
+  sl_group q1d[SL_NJ], b[SL_NB];
+  int i;
+  kernel_signals(now, (const sl_group *)pack->p, (const sl_group *)pack->r, q1d, b);
+  for (; lane < end; lane++) {
+    const int64_t run = pack->run[lane];
+    double *row;
+    if (!pack->alive[lane] || job->rows[run] >= job->capacity) continue;
+    row = job->trajectory + (run * job->capacity + job->rows[run]++) * SL_NCOLUMNS;
+    *row++ = half_step_time(job, 2 * k);
+    for (i = 0; i < SL_NX; i++) *row++ = lane_of(pack->x[i], lane);
+    for (i = 0; i < SL_NJ; i++) *row++ = lane_of(q1d[i], lane);
+    for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->e[i], lane);
+    for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->sigma[i], lane);
+    for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->u[i], lane);
+    for (i = 0; i < SL_NB; i++) *row++ = lane_of(b[i], lane);
+  }
+}
+
+/* Takes a lane out of the pack at step k: its result is what it is now. */
+static void finish_lane(sl_pack *pack, int lane, int64_t k, enum sl_status status, int quantity) {
+  const sl_job *job = pack->job;
+  const int64_t run = pack->run[lane];
+  const double end = half_step_time(job, 2 * k);
+  int i;
+  for (i = 0; i < SL_NX; i++) job->final_state[run * SL_NX + i] = lane_of(pack->x[i], lane);
+  for (i = 0; i < SL_NJ; i++) {
+    sl_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, job->start_time, end, status == SL_OK,
+                      job->metrics + run * SL_NMETRICS + i * SL_METRICS_PER_JOINT);
+  }
+  job->end_time[run] = end;
+  job->status[run] = (int32_t)status;
+  job->quantity[run] = quantity;
+  pack->alive[lane] = 0;
+  pack->live--;
+}
+
+/*
+ * Ends the runs whose next state is not finite or out of bounds; they keep the state of step k. Their lanes go on from
+ * zero, so that what they compute stays harmless.
+ */
+static void stop_runaways(sl_pack *pack, int64_t k, sl_group *next, double bound, sl_time now) {
+  const int between_rows = pack->job->output_every > 0 && k % pack->job->output_every != 0;
+  int lane, i, bad;
+  for (lane = 0; lane < SL_PACK; lane++) {
+    for (bad = 0; bad < SL_NX && sl_fabs(lane_of(next[bad], lane)) <= bound; bad++) continue;
+    if (bad == SL_NX) continue;
+    if (pack->alive[lane]) {
+      const double value = sl_fabs(lane_of(next[bad], lane));
+      if (between_rows) write_row(pack, k, now, lane, lane + 1);
+      finish_lane(pack, lane, k, value <= DBL_MAX ? SL_OUT_OF_BOUNDS : SL_DIVERGED, bad);
+    }
+    for (i = 0; i < SL_NX; i++) set_lane(next[i], lane, 0.0);
+  }
+}
+
+/* Metrics and trajectory at step k, where e, sigma, u belong to x. */
+static void observe(sl_pack *pack, int64_t k, sl_time now) {
+  const sl_job *job = pack->job;
+  const double t = half_step_time(job, 2 * k), h = k < job->steps ? job->step : 0.0;
+  const int late = 4 * k >= 3 * job->steps;
+  int i, g;
+  for (i = 0; i < SL_NJ; i++) {
+    for (g = 0; g < SL_G; g++) {
+      if (k == 0) {
+        sl_metrics_start(&pack->metrics[i][g], pack->e[i][g], pack->u[i][g], pack->sigma[i][g], pack->x[SL_NJ + i][g],
+                         job->response_band, job->settling_band);
+      }
+      sl_metrics_sample(&pack->metrics[i][g], t, h, late, pack->e[i][g], pack->u[i][g], pack->sigma[i][g],
+                        pack->x[SL_NJ + i][g]);
+    }
+  }
+  if (job->output_every > 0 && (k % job->output_every == 0 || k == job->steps)) write_row(pack, k, now, 0, pack->lanes);
+}
+
+/* One classical Runge-Kutta step from x into next; e, sigma and u are those at the start of the step. */
+static void step_rk4(sl_pack *pack, int64_t k, const sl_time *times, sl_group *next) {
+  static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  static const int when[4] = {0, 1, 1, 2};
+  const double h = pack->job->step;
+  const sl_group *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
+  sl_group at[SL_NX], slope[SL_NX];
+  int stage, i, g;
+  for (i = 0; i < SL_NX; i++) {
+    for (g = 0; g < SL_G; g++) {
+      at[i][g] = pack->x[i][g];
+      next[i][g] = pack->x[i][g];
+    }
+  }
+#pragma GCC unroll 1
+  for (stage = 0; stage < 4; stage++) {
+    const sl_v advance = slv_set(stage < 3 ? node[stage + 1] * h : 0.0), gain = slv_set(weight[stage] * h);
+#if SL_SAMPLED
+    kernel_plant(times[when[stage]], (const sl_group *)at, (const sl_group *)pack->u, p, r, slope);
+#else
+    sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
+    kernel_closed(times[when[stage]], (const sl_group *)at, p, r, slope, u, e, sigma);
+    if (stage == 0) {
+      for (i = 0; i < SL_NJ; i++) {
+        for (g = 0; g < SL_G; g++) {
+          pack->u[i][g] = u[i][g];
+          pack->e[i][g] = e[i][g];
+          pack->sigma[i][g] = sigma[i][g];
+        }
+      }
+      observe(pack, k, times[0]);
+    }
+#endif
+    for (i = 0; i < SL_NX; i++) {
+      for (g = 0; g < SL_G; g++) {
+        next[i][g] = next[i][g] + gain * slope[i][g];
+        at[i][g] = pack->x[i][g] + advance * slope[i][g];
+      }
+    }
+  }
+}
+
+#if SL_SAMPLED
+/* Control of step k: a new sample, or the held one with its error and sliding variable. */
+static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
+  const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
+  if (k % pack->job->hold == 0) {
+    kernel_control(now, x, p, r, pack->u, pack->e, pack->sigma);
+  } else {
+    kernel_error(now, x, p, r, pack->e, pack->sigma);
+  }
+}
+#endif
+
+/* e, sigma and u at the end of the run. */
+static void control_at_end(sl_pack *pack, int64_t k, sl_time now) {
+#if SL_SAMPLED
+  sample_control(pack, k, now);
+#else
+  sl_group slope[SL_NX];
+  kernel_closed(now, (const sl_group *)pack->x, (const sl_group *)pack->p, (const sl_group *)pack->r, slope, pack->u,
+                pack->e, pack->sigma);
+  (void)k;
+#endif
+}
+
+static void load_pack(sl_pack *pack, const sl_job *job, int64_t first) {
+  int lane, i;
+  pack->job = job;
+  pack->clock.job = job;
+  pack->clock.block[0] = pack->clock.block[1] = -1;
+  pack->lanes = (int)(job->last - first < SL_PACK ? job->last - first : SL_PACK);
+  pack->live = pack->lanes;
+  for (lane = 0; lane < SL_PACK; lane++) {
+    const int64_t run = first + (lane < pack->lanes ? lane : pack->lanes - 1);
+    pack->run[lane] = run;
+    pack->alive[lane] = lane < pack->lanes;
+    for (i = 0; i < SL_NP; i++) set_lane(pack->p[i], lane, job->parameters[run * SL_NP + i]);
+    if (lane < pack->lanes && job->rows) job->rows[run] = 0;
+  }
+  kernel_run((const sl_group *)pack->p, pack->r);
+  kernel_start((const sl_group *)pack->p, (const sl_group *)pack->r, pack->x);
+}
+
+static int within(const sl_group *x, double bound) {
+  const sl_v limit = slv_set(bound);
+  sl_m inside = slv_fabs(x[0][0]) <= limit;
+  int i, g;
+  for (i = 0; i < SL_NX; i++) {
+    for (g = 0; g < SL_G; g++) inside = inside & (slv_fabs(x[i][g]) <= limit);
+  }
+  return slv_all(inside);
+}
+
+static void run_pack(sl_pack *pack, const sl_job *job, int64_t first) {
+  const double bound = sl_fmin(job->bound, DBL_MAX);
+  sl_group *before = pack->varying[0], *middle = pack->varying[1], *after = pack->varying[2];
+  sl_time times[3];
+  int64_t k, reported = 0;
+  int lane, i, g;
+  load_pack(pack, job, first);
+  times[0] = time_at(pack, 0, before);
+  for (k = 0; k < job->steps && pack->live > 0; k++) {
+    sl_group next[SL_NX], *swap;
+    times[1] = time_at(pack, 2 * k + 1, middle);
+    times[2] = time_at(pack, 2 * k + 2, after);
+#if SL_SAMPLED
+    sample_control(pack, k, times[0]);
+    observe(pack, k, times[0]);
+#endif
+    step_rk4(pack, k, times, next);
+    if (!within((const sl_group *)next, bound)) stop_runaways(pack, k, next, bound, times[0]);
+    for (i = 0; i < SL_NX; i++) {
+      for (g = 0; g < SL_G; g++) pack->x[i][g] = next[i][g];
+    }
+    times[0] = times[2];
+    swap = before;
+    before = after;
+    after = swap;
+    if ((k + 1) % 4096 == 0) {
+      if (job->progress) {
+        __atomic_fetch_add(job->progress, (k + 1 - reported) * pack->lanes, __ATOMIC_RELAXED);
+        reported = k + 1;
+      }
+      if (job->stop && *job->stop) break;
+    }
+  }
+  if (job->progress) __atomic_fetch_add(job->progress, (job->steps - reported) * pack->lanes, __ATOMIC_RELAXED);
+  if (pack->live == 0) return;
+  control_at_end(pack, k, times[0]);
+  observe(pack, k, times[0]);
+  for (lane = 0; lane < pack->lanes; lane++) {
+    if (pack->alive[lane]) finish_lane(pack, lane, k, k == job->steps ? SL_OK : SL_STOPPED, -1);
+  }
+}
+
+/* ---- entry points -------------------------------------------------------------------------------------- */
+
+/* Sizes a caller has to know: pack, parameters, states, metrics, columns, tables. */
+__attribute__((visibility("default"))) void springline_layout(int64_t *layout) {
+  layout[0] = SL_PACK;
+  layout[1] = SL_NP;
+  layout[2] = SL_NX;
+  layout[3] = SL_NMETRICS;
+  layout[4] = SL_NCOLUMNS;
+  layout[5] = SL_NTABLES;
+}
+
+__attribute__((visibility("default"))) void springline_simulate(const sl_job *job) {
+  sl_pack pack;
+  int64_t first;
+  for (first = job->first; first < job->last; first += SL_PACK) run_pack(&pack, job, first);
+}

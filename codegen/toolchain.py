@@ -1,0 +1,355 @@
+"""From C sources to a loaded shared library: find a compiler, build once, keep the result by content.
+
+The cache key holds everything that decides the machine code: sources, flags, and every macro the compiler
+predefines under those flags. The macros name compiler version, target, C library and, with ``-march=native``,
+each CPU feature, so a cache on a shared home never hands an AVX-512 library to a machine without AVX-512.
+"""
+
+import contextlib
+import ctypes
+import errno
+import fcntl
+import functools
+import hashlib
+import importlib.util
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Literal, NamedTuple
+
+Family = Literal["gcc", "clang", "zig"]
+
+BASE_FLAGS = ("-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Werror")
+"""Flags of every build. No contraction, or bits depend on the machine; errno would make sqrt a call."""
+
+_LIBRARY = "library.so"
+_CHECKSUM = "library.sha256"
+_STDERR_LINES = 12
+_NO_COMPILER = (
+    "no C compiler found: install one from your system (Debian, Ubuntu: apt-get install gcc libc6-dev; "
+    "Fedora: dnf install gcc; macOS: xcode-select --install) or run: pip install 'springline[compiler]'"
+)
+
+
+class ToolchainError(RuntimeError):
+    """No compiler, a failed build or an unusable cache; the message says what to do about it."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler that has been seen to preprocess ``#include <math.h>``.
+
+    argv     how it is called; the first entry is an absolute path
+    family   whose command line and diagnostics it follows
+    version  as the compiler names itself, for example ``12.2.0``
+    target   machine triple, for example ``x86_64-linux-gnu``
+    """
+
+    argv: tuple[str, ...]
+    family: Family
+    version: str
+    target: str
+
+
+class Check(NamedTuple):
+    """One row of ``springline doctor``."""
+
+    name: str
+    value: str
+    ok: bool
+
+
+# --- finding a compiler ----------------------------------------------------------------------------------
+
+
+def find_compiler() -> Compiler:
+    """The compiler to use: $CC (arguments allowed), else the first that works of cc, gcc, clang, ziglang.
+
+    Raises ToolchainError if $CC is set but does not work, or if there is none at all.
+    """
+    return _find_compiler(os.environ.get("CC", "").strip(), os.environ.get("PATH", os.defpath))
+
+
+@functools.cache
+def _find_compiler(cc: str, path: str) -> Compiler:
+    # `path` is a cache key only: after a change of $PATH the search starts again.
+    if cc:
+        compiler = probe_compiler(shlex.split(cc))
+        if compiler is None:
+            raise ToolchainError(
+                f"the environment variable CC is {cc!r}, which is no working C compiler: correct or unset it"
+            )
+        return compiler
+    candidates = [["cc"], ["gcc"], ["clang"]]
+    if importlib.util.find_spec("ziglang") is not None:
+        candidates.append([sys.executable, "-m", "ziglang", "cc"])
+    for argv in candidates:
+        compiler = probe_compiler(argv)
+        if compiler is not None:
+            return compiler
+    raise ToolchainError(_NO_COMPILER)
+
+
+def probe_compiler(argv: Sequence[str]) -> Compiler | None:
+    """The compiler called by `argv`; None where there is none or it does not find the C library's headers."""
+    program = shutil.which(argv[0])
+    if program is None:
+        return None
+    call = (os.path.abspath(program), *argv[1:])
+    try:
+        macros = _preprocess(call, ())
+        target = _call([*call, "-dumpmachine"]).stdout.strip()
+    except ToolchainError:
+        return None
+    if "ziglang" in call or Path(program).name.startswith("zig"):
+        family: Family = "zig"
+    else:
+        family = "clang" if "__clang__" in macros else "gcc"
+    return Compiler(call, family, macros.get("__VERSION__", "unknown").strip('" '), target)
+
+
+def predefined_macros(compiler: Compiler, flags: Sequence[str] = ()) -> Mapping[str, str]:
+    """Every macro that `compiler` defines under `flags`, ``<math.h>`` and so the C library's included.
+
+    Raises ToolchainError if the compiler refuses the flags.
+    """
+    return _cached_macros(compiler, tuple(flags))
+
+
+@functools.cache
+def _cached_macros(compiler: Compiler, flags: tuple[str, ...]) -> Mapping[str, str]:
+    return _preprocess(compiler.argv, flags)
+
+
+def _preprocess(argv: Sequence[str], flags: Sequence[str]) -> Mapping[str, str]:
+    done = _call([*argv, *flags, "-dM", "-E", "-x", "c", "-"], stdin="#include <math.h>\n")
+    definitions = (line.split(maxsplit=2) for line in done.stdout.splitlines() if line.startswith("#define "))
+    return {words[1]: words[2] if len(words) == 3 else "" for words in definitions}
+
+
+@functools.cache
+def native_flags(compiler: Compiler) -> tuple[str, ...]:
+    """The flags that let `compiler` use all of this machine's CPU; none where it knows no such flag."""
+    for flag in ("-march=native", "-mcpu=native"):
+        with contextlib.suppress(ToolchainError):  # refused: the other spelling, or the baseline
+            predefined_macros(compiler, (flag,))
+            return (flag,)
+    return ()
+
+
+def native_vector_width(compiler: Compiler | None = None) -> int:
+    """How many doubles a vector register of this machine holds: 8 (AVX-512F), 4 (AVX) or 2."""
+    compiler = compiler or find_compiler()
+    macros = predefined_macros(compiler, native_flags(compiler))
+    if "__AVX512F__" in macros:
+        return 8
+    return 4 if "__AVX__" in macros else 2
+
+
+# --- building --------------------------------------------------------------------------------------------
+
+
+def cache_root() -> Path:
+    """$SPRINGLINE_CACHE, else $XDG_CACHE_HOME/springline, else ~/.cache/springline."""
+    own = os.environ.get("SPRINGLINE_CACHE")
+    if own:
+        return Path(own).absolute()
+    shared = os.environ.get("XDG_CACHE_HOME")
+    return (Path(shared) if shared else Path.home() / ".cache").absolute() / "springline"
+
+
+def build_library(
+    sources: Mapping[str, str | bytes],
+    *,
+    main: str,
+    flags: Sequence[str] = (),
+    compiler: Compiler | None = None,
+) -> Path:
+    """The shared library that `main` compiles to, built on first need and then taken from the cache.
+
+    sources   file name (relative, ``/`` allowed) -> content; `main` may include all others by these names
+    main      the one file that is compiled
+    flags     added after BASE_FLAGS, and so winning over them; -std=c99 and -O2 where they name no other.
+              ``-l`` flags go behind the source, as linkers want them.
+
+    Warnings are errors. The same input gives the same bytes wherever it is built: names are relative, and
+    the folder it was built in is not recorded. Any number of threads and processes may ask at once.
+
+    Raises ToolchainError with the command and the compiler's first lines if it fails, ValueError if a file
+    name leaves the folder or `main` is not among the sources.
+    """
+    compiler = compiler or find_compiler()
+    content = _checked_sources(sources, main)
+    command = _command(compiler, main, flags)
+    try:
+        entry = cache_root() / _cache_key(compiler, content, command)
+        library = entry / _LIBRARY
+        if _intact(entry):
+            return library
+        entry.mkdir(parents=True, exist_ok=True)
+        with _locked(entry / "lock") as exclusive:
+            if exclusive:  # whatever lies here is of a build that was killed
+                for leftover in entry.glob("build-*"):
+                    shutil.rmtree(leftover, ignore_errors=True)
+            if not _intact(entry):
+                _build(entry, content, command)
+    except OSError as error:
+        raise ToolchainError(
+            f"cannot use the cache folder {cache_root()} ({error}): make it writable or set SPRINGLINE_CACHE"
+        ) from error
+    return library
+
+
+def load(library: Path) -> ctypes.CDLL:
+    """The library, loaded; every call into it releases the GIL. Raises ToolchainError if it cannot be."""
+    try:
+        return ctypes.CDLL(os.fspath(library))
+    except OSError as error:
+        raise ToolchainError(f"cannot load the compiled library: {error}") from error
+
+
+def _checked_sources(sources: Mapping[str, str | bytes], main: str) -> dict[str, bytes]:
+    for name in sources:
+        path = PurePosixPath(name)
+        if path.is_absolute() or ".." in path.parts or not path.name:
+            raise ValueError(f"source name {name!r} must be relative and stay inside the build folder")
+    if main not in sources:
+        raise ValueError(f"main {main!r} is not among the sources: {', '.join(sorted(sources))}")
+    return {name: text.encode() if isinstance(text, str) else text for name, text in sorted(sources.items())}
+
+
+def _command(compiler: Compiler, main: str, flags: Sequence[str]) -> list[str]:
+    """The whole compile command, relative to the build folder."""
+    libraries = [flag for flag in flags if flag.startswith("-l")]
+    others = [flag for flag in flags if not flag.startswith("-l")]
+    defaults = []
+    if not any(flag.startswith("-std=") for flag in others):
+        defaults.append("-std=c99")
+    if not any(flag.startswith("-O") for flag in others):
+        defaults.append("-O2")
+    if compiler.family == "zig":  # it turns the undefined-behaviour sanitizer on by itself
+        defaults.append("-fno-sanitize=undefined")
+    if sys.platform.startswith("linux"):  # a missing symbol fails here, not when the library is loaded
+        defaults.append("-Wl,-z,defs")
+    return [*compiler.argv, *BASE_FLAGS, *defaults, *others, "-I.", main, "-o", _LIBRARY, *libraries]
+
+
+def _cache_key(compiler: Compiler, content: Mapping[str, bytes], command: Sequence[str]) -> str:
+    # The preprocessor is asked with what steers the generated code only: for a linker's flag it has no use,
+    # and clang says so, which -Werror would turn into a failure.
+    flags = command[len(compiler.argv) :]
+    steering = [flag for flag in flags if flag.startswith(("-f", "-m", "-O", "-std=", "-D", "-U"))]
+    macros = predefined_macros(compiler, steering)
+    identity = {
+        "arguments": command[1:],  # the compiler counts by what it is, not by where it lies
+        "family": compiler.family,
+        "target": compiler.target,
+        "macros": macros,
+        "sources": {name: hashlib.sha256(text).hexdigest() for name, text in content.items()},
+    }
+    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+
+
+def _intact(entry: Path) -> bool:
+    """Whether the entry's library is there and has the checksum that was written with it."""
+    try:
+        digest = hashlib.sha256((entry / _LIBRARY).read_bytes()).hexdigest()
+        return (entry / _CHECKSUM).read_text(encoding="ascii", errors="replace") == digest
+    except FileNotFoundError:
+        return False
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[bool]:
+    """Hold the lock on `path`; yields False where the file system has no locks.
+
+    The lock saves double work and lets us clear up after a killed build. It is not what keeps the cache
+    sound: renames and checksums do, so a file system without locks (some cluster homes) will do.
+    """
+    with path.open("a") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX)
+        except OSError as error:
+            if error.errno not in (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP):
+                raise
+            yield False
+        else:
+            yield True
+
+
+def _build(entry: Path, content: Mapping[str, bytes], command: Sequence[str]) -> None:
+    with tempfile.TemporaryDirectory(prefix="build-", dir=entry) as folder:
+        work = Path(folder)
+        for name, text in content.items():
+            (work / name).parent.mkdir(parents=True, exist_ok=True)
+            (work / name).write_bytes(text)
+        _call([*command, f"-ffile-prefix-map={work}=."], cwd=work)
+        library = work / _LIBRARY
+        checksum = work / _CHECKSUM
+        checksum.write_text(hashlib.sha256(library.read_bytes()).hexdigest(), encoding="ascii")
+        for file in (library, checksum):  # a reader in between sees a mismatch and comes to the lock
+            with file.open("rb+") as stream:
+                os.fsync(stream.fileno())
+            os.replace(file, entry / file.name)
+
+
+def _call(
+    argv: Sequence[str], *, cwd: Path | None = None, stdin: str = ""
+) -> subprocess.CompletedProcess[str]:
+    """Run a compiler. Raises ToolchainError with the command and the first lines of its messages."""
+    environment = dict(os.environ, LC_ALL="C")
+    environment.setdefault("ZIG_GLOBAL_CACHE_DIR", str(cache_root() / "zig"))
+    try:
+        done = subprocess.run(
+            argv,
+            check=False,
+            cwd=cwd,
+            input=stdin,
+            env=environment,
+            capture_output=True,
+            text=True,
+            errors="replace",
+        )
+    except OSError as error:
+        raise ToolchainError(f"cannot run {shlex.join(argv)}: {error}") from error
+    if done.returncode != 0:
+        lines = (done.stderr.strip() or "(it printed no message)").splitlines()
+        if len(lines) > _STDERR_LINES:
+            lines[_STDERR_LINES:] = [f"... and {len(lines) - _STDERR_LINES} more lines"]
+        raise ToolchainError("\n  ".join(["the compiler failed:", shlex.join(argv), *lines]))
+    return done
+
+
+# --- springline doctor -----------------------------------------------------------------------------------
+
+
+def checks() -> list[Check]:
+    """The state of the toolchain: compiler, vector width, cache, and whether a library builds and loads."""
+    root = cache_root()
+    try:
+        compiler = find_compiler()
+    except ToolchainError as error:
+        return [Check("C compiler", str(error), False), Check("cache", str(root), True)]
+    rows = [
+        Check("C compiler", shlex.join(compiler.argv), True),
+        Check("compiler version", f"{compiler.family} {compiler.version}", True),
+        Check("target", compiler.target, True),
+        Check("native flags", shlex.join(native_flags(compiler)) or "(none)", True),
+        Check("vector width", f"{native_vector_width(compiler)} doubles", True),
+        Check("cache", str(root), True),
+    ]
+    source = "int springline_probe(int x);\nint springline_probe(int x) { return x + 1; }\n"
+    try:
+        library = load(build_library({"probe.c": source}, main="probe.c", compiler=compiler))
+        works = library.springline_probe(41) == 42
+        rows.append(Check("build and load", "works" if works else "the library gave a wrong sum", works))
+    except ToolchainError as error:
+        rows.append(Check("build and load", str(error), False))
+    return rows

@@ -1,0 +1,93 @@
+"""Lagrange's equations on a moving base, by automatic differentiation of two energies (PAPER sections 1 and 2).
+
+    M(q) ddq + C(q, dq) dq + G(q) = S + generalised forces                                                (1)
+
+The kinetic energy T(q, dq, omega) is taken in a frame that moves with the base origin; by the principle of equivalence
+the origin's acceleration then acts as gravity does, so the potential energy takes the specific force in place of
+gravity. S is minus (left side, base moving - left side, base at rest); it contains no ddq because M does not depend on
+the base. Any number of joints, any base motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import casadi as ca
+
+from springline.model.base import BaseMotion
+from springline.model.normal_form import collect
+from springline.model.parameters import Joint, Parameter, Values
+
+
+class Mechanism(Protocol):
+    """What a mechanism has to tell: its joints, its parameters, and two energies.
+
+    `parameters` must contain "g". `motor_inertia` and `stiffness` declare the series elastic drive, one per joint.
+    kinetic_energy(q, dq, omega, p): J; velocities are jtimes(r, q, dq) + cross(omega, r), base axes
+    potential_energy(q, gravity, p): J; `gravity` is a 3 x 1 vector that points up, m/s^2, base axes
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    parameters: tuple[Parameter, ...]
+    motor_inertia: tuple[Parameter, ...]
+    stiffness: tuple[Parameter, ...]
+
+    def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX: ...
+
+    def potential_energy(self, q: ca.SX, gravity: ca.SX, p: Values) -> ca.SX: ...
+
+
+@dataclass(frozen=True, slots=True)
+class EquationsOfMotion:
+    """The terms of (1). n joints; symbols q, dq (n x 1), omega, alpha, gravity (3 x 1) and p are left free.
+
+    mass         M(q), n x n
+    coriolis     C(q, dq) dq, n x 1, base at rest
+    gravity      G(q), n x 1, base at rest
+    disturbance  S, n x 1
+    bias         C dq + G - S in one normal form: what the moving plant needs, with the fewest operations
+    """
+
+    mass: ca.SX
+    coriolis: ca.SX
+    gravity: ca.SX
+    disturbance: ca.SX
+    bias: ca.SX
+
+
+def equations_of_motion(mechanism: Mechanism, q: ca.SX, dq: ca.SX, base: BaseMotion, p: Values) -> EquationsOfMotion:
+    """Derive (1) from the mechanism's energies; q, dq, and the entries of `base` and `p` are symbols."""
+    omega, alpha, gravity = (ca.SX.sym(name, 3) for name in ("omega", "alpha", "gravity"))
+    kinetic = mechanism.kinetic_energy(q, dq, omega, p)
+    potential = mechanism.potential_energy(q, gravity, p)
+
+    momentum = ca.gradient(kinetic, dq)
+    mass = ca.jacobian(momentum, dq)
+    moving = (
+        ca.jtimes(momentum, q, dq) + ca.jtimes(momentum, omega, alpha)
+        - ca.gradient(kinetic, q) + ca.gradient(potential, q)
+    )
+    at_rest = [ca.SX.zeros(3), ca.SX.zeros(3), ca.vertcat(0, p.g, 0)]
+    rest = ca.substitute(moving, ca.vertcat(omega, alpha, gravity), ca.vertcat(*at_rest))
+    weight = ca.substitute(ca.gradient(potential, q), gravity, at_rest[2])
+
+    state, imu = ca.vertcat(q, dq), ca.vertcat(omega, alpha, gravity)
+    symbols = ca.vertcat(state, imu, *p.values())
+
+    def normal(expression: ca.SX) -> ca.SX:
+        return collect(expression, symbols, [state, imu])
+
+    felt = ca.vertcat(base.omega, base.alpha, base.specific_force(p.g))
+
+    def with_base(expression: ca.SX) -> ca.SX:
+        return ca.substitute(normal(expression), imu, felt)
+
+    return EquationsOfMotion(
+        mass=normal(mass),
+        coriolis=normal(rest - weight),
+        gravity=normal(weight),
+        disturbance=with_base(rest - moving),
+        bias=with_base(moving),
+    )

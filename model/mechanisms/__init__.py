@@ -1,0 +1,8 @@
+"""Mechanisms by name. A new one is one module with two energies and one line here."""
+
+from __future__ import annotations
+
+from springline.model.mechanisms.transfer_manipulator import TransferManipulator
+from springline.model.lagrange import Mechanism
+
+MECHANISMS: dict[str, Mechanism] = {mechanism.name: mechanism for mechanism in (TransferManipulator(),)}

@@ -1,0 +1,159 @@
+"""Terminal sliding surface and reaching laws (PAPER section 4, errata E3, E4, E8).
+
+A reaching law is one class with its parameters and one method; registering it in LAWS is all that is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal, Protocol
+
+import casadi as ca
+
+from springline.model.linear import over
+from springline.model.parameters import EVEN, LIMIT, NON_NEGATIVE, POSITIVE, UNIT_OPEN, Bounds, Parameter, Values
+
+LogForm = Literal["power", "base"]
+
+# Guards arguments of roots and logarithms at zero: far below any signal, and h**(-4/3) of it is still finite.
+TINY = 1e-200
+# exp of this is 1e304: a reaching law that asks for more is clipped by a_max or reported as divergence.
+LARGEST_EXPONENT = 700.0
+
+SURFACE_PARAMETERS = (
+    Parameter("mu", "1/s", (12.0, 5.0), "surface gain of the odd power e^(l/m)", POSITIVE),
+    Parameter("lambda", "1/s", 5.0, "surface gain of the terminal term e^(p/r)", POSITIVE),
+    Parameter("delta", "{q}", 0.05, "boundary layer of the terminal term (0: the literal law)", NON_NEGATIVE),
+)
+A_MAX = Parameter("a_max", "{q}/s^2", (200.0, 200.0), "limit on the reaching law's acceleration", LIMIT)
+
+K1 = Parameter("k1", "SI", 3.0, "gain of the reaching law's first term", POSITIVE)
+K2 = Parameter("k2", "SI", 5.0, "gain of the reaching law's second term", POSITIVE)
+K3 = Parameter("k3", "SI", 12.0, "gain of the reaching law's third term", POSITIVE)
+ALPHA = Parameter("alpha", "1", 0.5, "exponent of the reaching law", UNIT_OPEN)
+BETA = Parameter("beta", "1", 5.0, "exponent of the double power law's second term",
+                 Bounds(low=1.0, low_open=True))
+EPSILON_LOG = Parameter("epsilon_log", "SI", 10.0, "factor inside the logarithm", POSITIVE)
+NU = Parameter("nu", "1", 2.0, "even power inside the logarithm", EVEN)
+ZETA = Parameter("zeta", "1", 0.9, "exponent of the variable power", UNIT_OPEN)
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceExponents:
+    """Positive odd integers l > m and r > p of the surface (22)."""
+
+    l: int = 3  # noqa: E741 - the paper's letter
+    m: int = 1
+    p: int = 1
+    r: int = 3
+
+
+def odd_power(e: ca.SX, exponent: Fraction) -> tuple[ca.SX, ca.SX]:
+    """sgn(e) |e|^a and its derivative a |e|^(a-1), for a > 1."""
+    rest = exponent - 1
+    if rest.denominator == 1 and rest.numerator % 2 == 0:
+        growth = ca.SX(1)
+        for _ in range(rest.numerator // 2):
+            growth = growth * e**2
+    else:
+        growth = ca.fabs(e) ** float(rest)
+    return e * growth, float(exponent) * growth
+
+
+def terminal_term(e: ca.SX, delta: ca.SX, exponent: Fraction) -> tuple[ca.SX, ca.SX]:
+    """phi(e) = e h^((n-1)/2) with h = e^2 + delta^2, and phi'(e) = h^((n-3)/2) (n e^2 + delta^2), 0 < n < 1 (E3)."""
+    e2, d2 = e**2, delta**2
+    h = ca.fmax(e2 + d2, TINY)
+    root = h ** float((exponent - 1) / 2)
+    # h^((n-3)/2) is a whole power of h^((n-1)/2) for the usual n (4 for 1/3): products instead of a second power.
+    ratio = (exponent - 3) / (exponent - 1)
+    if ratio.denominator == 1 and ratio <= 8:
+        steep = ca.SX(1)
+        power, square = int(ratio), root
+        while power:
+            if power & 1:
+                steep = steep * square
+            power >>= 1
+            if power:
+                square = square**2
+    else:
+        steep = root / h
+    return e * root, steep * (float(exponent) * e2 + d2)
+
+
+def surface(e: ca.SX, de: ca.SX, p: Values, exponents: SurfaceExponents) -> tuple[ca.SX, ca.SX]:
+    """Sliding variable (22) and the part of its time derivative that the control cancels in (25).
+
+    e, de: tracking error and rate, n x 1. Returns sigma (n x 1, 1/s of the coordinate) and
+    de * (mu (l/m) |e|^((l-m)/m) + lambda phi'(e)).
+    """
+    sigma, slope = [], []
+    for i in range(e.numel()):
+        strong, strong_slope = odd_power(e[i], Fraction(exponents.l, exponents.m))
+        weak, weak_slope = terminal_term(e[i], p.delta, Fraction(exponents.p, exponents.r))
+        sigma.append(de[i] + p.mu[i] * strong + p["lambda"] * weak)
+        slope.append(de[i] * (p.mu[i] * strong_slope + p["lambda"] * weak_slope))
+    return ca.vertcat(*sigma), ca.vertcat(*slope)
+
+
+class ReachingLaw(Protocol):
+    """A reaching law: rate(sigma, p, log_form) is the wished d sigma / dt, for a scalar sigma."""
+
+    name: str
+    title: str
+    parameters: tuple[Parameter, ...]
+
+    def rate(self, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX: ...
+
+
+class VariablePowerLog:
+    """-k1 f(s) - k2 L^(1+alpha) sgn s - k3 L^(1-alpha) sgn s, L = ln(epsilon |s|^nu + 1)          (18), (19), E8."""
+
+    name = "variable_power_log"
+    title = "variable power log"
+    parameters = (K1, K2, K3, ALPHA, EPSILON_LOG, NU, ZETA)
+
+    def rate(self, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX:
+        size = ca.fmax(ca.fabs(sigma), TINY)
+        exponent = p.zeta * ca.fmax(size, 1.0) * ca.log(size)
+        power = ca.exp(ca.fmin(exponent, LARGEST_EXPONENT))
+        log = ca.fmax(ca.log1p(p.epsilon_log * size**p.nu), TINY)
+        if log_form == "power":
+            fast, slow = log * log**p.alpha, log ** (1 - p.alpha)
+        else:
+            fast, slow = over(log, ca.log1p(p.alpha)), over(log, -ca.log1p(-p.alpha))
+        return -(p.k1 * power + p.k2 * fast + p.k3 * slow) * ca.sign(sigma)
+
+
+class DoublePower:
+    """-k1 |s|^alpha sgn s - k2 |s|^beta sgn s                                                            (21)."""
+
+    name = "double_power"
+    title = "double power"
+    parameters = (K1, K2, ALPHA, BETA)
+
+    def rate(self, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX:
+        size = ca.fmax(ca.fabs(sigma), TINY)
+        return -(p.k1 * size**p.alpha + p.k2 * size**p.beta) * ca.sign(sigma)
+
+
+class Power:
+    """-k1 |s|^alpha sgn s                                                                                (20)."""
+
+    name = "power"
+    title = "power"
+    parameters = (K1, ALPHA)
+
+    def rate(self, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX:
+        size = ca.fmax(ca.fabs(sigma), TINY)
+        return -(p.k1 * size**p.alpha) * ca.sign(sigma)
+
+
+LAWS: dict[str, ReachingLaw] = {law.name: law for law in (VariablePowerLog(), DoublePower(), Power())}
+
+
+def reaching_rate(law: ReachingLaw, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX:
+    """The law's d sigma / dt per joint (n x 1), limited to +-a_max (E4)."""
+    wished = ca.vertcat(*(law.rate(sigma[i], p, log_form) for i in range(sigma.numel())))
+    return ca.fmin(ca.fmax(wished, -p.a_max), p.a_max)

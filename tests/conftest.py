@@ -1,0 +1,40 @@
+"""What all tests share: one kernel cache, one rule for missing tools, no deadlines."""
+
+import os
+import shutil
+from collections.abc import Callable
+
+import pytest
+from hypothesis import settings
+
+# Two cores shared by several workers: a wall-clock deadline would fail at random. In CI a red test must be
+# red again on the next machine, so examples are drawn from a fixed seed.
+settings.register_profile("springline", deadline=None, derandomize=os.environ.get("CI") == "true")
+settings.load_profile("springline")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    # Not the user's cache, but one for all workers and sessions: entries are keyed by content, so an old
+    # one can only be the right one.
+    os.environ["SPRINGLINE_CACHE"] = str(config.rootpath / ".pytest_cache" / "springline")
+    os.environ["MPLBACKEND"] = "Agg"
+
+
+@pytest.fixture(scope="session")
+def require_tool() -> Callable[..., str]:
+    """``require_tool(name, hint="")``: the path of a program that a test needs.
+
+    Where it is missing the test is skipped and says so; in CI (CI=true) it fails, for there .ci/run installs
+    every tool and a skip would hide a gap.
+    """
+
+    def require(name: str, hint: str = "") -> str:
+        path = shutil.which(name)
+        if path is not None:
+            return path
+        reason = f"{name} is not installed" + (f": {hint}" if hint else "")
+        if os.environ.get("CI") == "true":
+            pytest.fail(reason)
+        pytest.skip(reason)
+
+    return require
