@@ -9,14 +9,23 @@ import casadi as ca
 from springline.codegen.program import Program
 
 
-def print_functions(functions: Sequence[ca.Function], stem: str) -> str:
+def print_functions(
+    functions: Sequence[ca.Function],
+    stem: str,
+    *,
+    includes: Sequence[str] = ("sl_casadi.h",),
+    integer: str = "int",
+) -> str:
     """CasADi's C source of SX Functions, for a file named stem.c.
 
-    The mathematics come from "sl_casadi.h"; nothing of the host's <math.h> is used.
+    includes  the last has to be "sl_casadi.h": the mathematics come from there, nothing from the host's <math.h>
+    integer   C type of sizes and sparsity patterns; casadi.external expects "long long int"
     """
-    generator = ca.CodeGenerator(f"{stem}.c", {
-        "with_header": False, "include_math": False, "casadi_int": "int", "static_aux": True})
-    generator.add_include("sl_casadi.h", True)
+    generator = ca.CodeGenerator(
+        f"{stem}.c", {"with_header": False, "include_math": False, "casadi_int": integer, "static_aux": True}
+    )
+    for include in includes:
+        generator.add_include(include, True)
     for function in functions:
         generator.add(function)
     text: str = generator.dump()

@@ -2,7 +2,7 @@
 
 Walking the frozen instruction lists, equal operations on equal arguments become one node (value numbering), so work is
 shared across Functions. Baked parameters are constants here, and exact operations on constants (+ - * / sqrt and
-comparisons, which IEEE 754 fixes to the last bit) are done; transcendental ones never are. Nothing is re-associated.
+comparisons, which IEEE 754 fixes to the last bit) are done; transcendental ones never are. Nothing is regrouped.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ class Node:
     """A value: an operation on other nodes, a leaf (op None, with a source), or a constant.
 
     varies  whether it depends on a tunable parameter
+    origin  the Function it was first met in
     """
 
     op: int | None
@@ -40,6 +41,7 @@ class Node:
     varies: bool = False
     value: float = math.nan
     source: tuple[str, int] = ("", 0)
+    origin: str = ""
 
 
 _COMMUTATIVE = frozenset({ca.OP_ADD, ca.OP_MUL, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR})
@@ -81,8 +83,11 @@ class Graph:
         self._index: dict[object, int] = {}
         self.tunable = tuple(slot.key for slot in program.system.slots if slot.key not in baked)
         columns = {key: i for i, key in enumerate(self.tunable)}
+        self._slot_of_column = [i for i, slot in enumerate(program.system.slots) if slot.key in columns]
         p = [
-            self.constant(baked[slot.key]) if slot.key in baked else self._leaf("p", columns[slot.key], Binding.RUN, True)
+            self.constant(baked[slot.key])
+            if slot.key in baked
+            else self._leaf("p", columns[slot.key], Binding.RUN, True)
             for slot in program.system.slots
         ]
         t = [self._leaf("t", 0, Binding.UNIFORM)]
@@ -102,7 +107,7 @@ class Graph:
     def constant(self, value: float) -> int:
         """The node of a constant; 0.0 and -0.0 are two."""
         key = ("constant", value, math.copysign(1.0, value))
-        return self._intern(key, Node(None, (), Binding.CONSTANT, value=value, source=("constant", 0)))
+        return self._intern(key, Node(None, (), Binding.CONSTANT, value=float(value), source=("constant", 0)))
 
     def _leaf(self, name: str, index: int, binding: Binding, varies: bool = False) -> int:
         return self._intern((name, index), Node(None, (), binding, varies, source=(name, index)))
@@ -113,7 +118,7 @@ class Graph:
             self.nodes.append(node)
         return self._index[key]
 
-    def _operation(self, op: int, arguments: tuple[int, ...]) -> int:
+    def _operation(self, op: int, arguments: tuple[int, ...], origin: str) -> int:
         nodes = [self.nodes[i] for i in arguments]
         if op in _EXACT and all(node.binding is Binding.CONSTANT for node in nodes):
             try:
@@ -122,10 +127,10 @@ class Graph:
                 pass  # 1/0, sqrt(-1): left to C, which knows Inf and NaN
         key = (op, tuple(sorted(arguments)) if op in _COMMUTATIVE else arguments)
         varies = any(node.varies for node in nodes)
-        binding = max(max(node.binding for node in nodes), Binding.RUN)
+        binding = max(Binding.RUN, *(node.binding for node in nodes))
         if binding in (Binding.UNIFORM, Binding.VARYING):
             binding = Binding.VARYING if varies else Binding.UNIFORM
-        return self._intern(key, Node(op, arguments, binding, varies))
+        return self._intern(key, Node(op, arguments, binding, varies, origin=origin))
 
     def add(self, name: str, function: ca.Function, inputs: Sequence[Sequence[int]]) -> list[list[int]]:
         """Add a Function's instructions with the given nodes as its inputs; returns the nodes of its outputs."""
@@ -143,12 +148,28 @@ class Graph:
             elif op == ca.OP_ASSIGN:
                 work[into[0]] = work[source[0]]
             else:
-                work[into[0]] = self._operation(op, tuple(work[i] for i in source))
+                work[into[0]] = self._operation(op, tuple(work[i] for i in source), name)
         self.outputs[name] = results
         return results
 
+    def value_at(self, i: int, parameters: Sequence[float]) -> float | None:
+        """Value of a run-time node at given slots' values where exact operations lead there, else None."""
+        node = self.nodes[i]
+        if node.binding is Binding.CONSTANT:
+            return node.value
+        if node.op is None:
+            return parameters[self._slot_of_column[node.source[1]]] if node.source[0] == "p" else None
+        arguments = [self.value_at(a, parameters) for a in node.arguments]
+        known = [a for a in arguments if a is not None]
+        if node.op not in _EXACT or len(known) < len(arguments):
+            return None
+        try:
+            return _EXACT[node.op](*known)
+        except (ZeroDivisionError, ValueError):
+            return None
+
     def needed(self, wanted: Sequence[int], binding: Binding) -> list[int]:
-        """Nodes of a binding time (and, for uniform ones, run values that no parameter varies) that `wanted` rest on."""
+        """Nodes that a function of this binding time has to compute for `wanted`."""
         found: set[int] = set()
         stack = list(wanted)
         while stack:

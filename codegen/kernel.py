@@ -20,8 +20,17 @@ from springline.model.system import Structure, TableLayout
 Engine = Literal["lanes", "casadi"]
 Floats = NDArray[np.float64]
 
-METRICS = ("response_time", "settling_time", "overshoot", "steady_state_error", "iae", "U_max", "U_tv", "sigma_tv",
-           "dq1_tv")
+METRICS = (
+    "response_time",
+    "settling_time",
+    "overshoot",
+    "steady_state_error",
+    "iae",
+    "U_max",
+    "U_tv",
+    "sigma_tv",
+    "dq1_tv",
+)
 """Per joint, in the order of metrics.h."""
 
 STATUS = ("ok", "diverged", "out_of_bounds", "stopped")
@@ -38,14 +47,16 @@ class KernelOptions:
     width    lanes in a vector, None for the machine's
     groups   vectors worked on at once to hide latency, None for what pays
     tunable  slot keys that each run may set for itself, None for all; the others are baked
-    flags    compiler flags
+    flags    optimisation flags, None for the best this machine can do
+    compiler  None for the one that is found
     """
 
     engine: Engine = "lanes"
     width: int | None = None
     groups: int | None = None
     tunable: tuple[str, ...] | None = None
-    flags: tuple[str, ...] = ("-O3", "-march=native")
+    flags: tuple[str, ...] | None = None
+    compiler: toolchain.Compiler | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,20 +118,40 @@ class Control:
 
 
 class _Table(ctypes.Structure):
-    _fields_ = [("t0", ctypes.c_double), ("dt", ctypes.c_double), ("intervals", ctypes.c_int64),
-                ("channels", ctypes.c_int64), ("periodic", ctypes.c_int64), ("coefficients", ctypes.c_void_p)]
+    _fields_ = [
+        ("t0", ctypes.c_double),
+        ("dt", ctypes.c_double),
+        ("intervals", ctypes.c_int64),
+        ("channels", ctypes.c_int64),
+        ("periodic", ctypes.c_int64),
+        ("coefficients", ctypes.c_void_p),
+    ]
 
 
 class _Job(ctypes.Structure):
     _fields_ = [
-        ("first", ctypes.c_int64), ("last", ctypes.c_int64), ("steps", ctypes.c_int64),
-        ("start_time", ctypes.c_double), ("step", ctypes.c_double), ("bound", ctypes.c_double),
-        ("hold", ctypes.c_int64), ("output_every", ctypes.c_int64),
-        ("response_band", ctypes.c_double), ("settling_band", ctypes.c_double),
-        ("parameters", ctypes.c_void_p), ("tables", ctypes.c_void_p), ("metrics", ctypes.c_void_p),
-        ("final_state", ctypes.c_void_p), ("end_time", ctypes.c_void_p), ("status", ctypes.c_void_p),
-        ("quantity", ctypes.c_void_p), ("trajectory", ctypes.c_void_p), ("rows", ctypes.c_void_p),
-        ("capacity", ctypes.c_int64), ("progress", ctypes.c_void_p), ("stop", ctypes.c_void_p),
+        ("first", ctypes.c_int64),
+        ("last", ctypes.c_int64),
+        ("steps", ctypes.c_int64),
+        ("start_time", ctypes.c_double),
+        ("step", ctypes.c_double),
+        ("bound", ctypes.c_double),
+        ("hold", ctypes.c_int64),
+        ("output_every", ctypes.c_int64),
+        ("response_band", ctypes.c_double),
+        ("settling_band", ctypes.c_double),
+        ("parameters", ctypes.c_void_p),
+        ("tables", ctypes.c_void_p),
+        ("metrics", ctypes.c_void_p),
+        ("final_state", ctypes.c_void_p),
+        ("end_time", ctypes.c_void_p),
+        ("status", ctypes.c_void_p),
+        ("quantity", ctypes.c_void_p),
+        ("trajectory", ctypes.c_void_p),
+        ("rows", ctypes.c_void_p),
+        ("capacity", ctypes.c_int64),
+        ("progress", ctypes.c_void_p),
+        ("stop", ctypes.c_void_p),
     ]
 
 
@@ -128,8 +159,14 @@ def preamble(program: Program, *, width: int, groups: int, sampled: bool, sizes:
     """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
     channels = sum(len(table.channels) for table in program.system.tables)
     numbers = {
-        "SL_NJ": program.system.n, "SL_NX": program.size("x"), "SL_NB": len(COORDINATES), "SL_NP": sizes["p"],
-        "SL_NR": sizes["r"], "SL_NU": sizes["uniform"], "SL_NV": sizes["varying"], "SL_ND": program.size("d"),
+        "SL_NJ": program.system.n,
+        "SL_NX": program.size("x"),
+        "SL_NB": len(COORDINATES),
+        "SL_NP": sizes["p"],
+        "SL_NR": sizes["r"],
+        "SL_NU": sizes["uniform"],
+        "SL_NV": sizes["varying"],
+        "SL_ND": program.size("d"),
         "SL_NTABLES": len(program.system.tables),
     }
     assert program.size("d") == len(program.system.tables) + 4 * channels
@@ -152,18 +189,19 @@ enum {{ {enum} }};
 
 
 class Kernel:
-    """The compiled loop of one structure.
+    """The compiled loop of one Program.
 
-    program     its Program
+    program     what it was printed from
     parameters  slot keys in the order of the columns that `run` takes
     width       runs that are simulated together (lanes x groups)
+    library     the shared library, in the cache
     """
 
-    def __init__(self, structure: Structure, sampled: bool, options: KernelOptions, baked: tuple[float, ...] = ()) -> None:
-        self.program = program(structure)
+    def __init__(self, program: Program, sampled: bool, options: KernelOptions, baked: tuple[float, ...] = ()) -> None:
+        self.program = program
         self.options = options
         sources, self.parameters, flags = self._sources(sampled, baked)
-        self.library = toolchain.build_library(sources, main="loop.c", flags=flags)
+        self.library = toolchain.build_library(sources, main="loop.c", flags=flags, compiler=options.compiler)
         handle = toolchain.load(self.library)
         self._simulate: Any = handle.springline_simulate
         self._simulate.restype = None
@@ -173,7 +211,12 @@ class Kernel:
         assert parameters == len(self.parameters) and tables == len(self.program.system.tables)
 
     def _sources(self, sampled: bool, baked: tuple[float, ...]) -> tuple[dict[str, str], tuple[str, ...], list[str]]:
-        flags = [*self.options.flags, "-std=gnu99", "-fvisibility=hidden", "-Wno-unused-parameter"]
+        compiler = self.options.compiler or toolchain.find_compiler()
+        best = ["-O3", *toolchain.native_flags(compiler)]
+        if compiler.family == "gcc":  # its scheduler before register allocation is what hides the latencies
+            best += ["-fschedule-insns", "-fsched-pressure"]
+        flags = [*(best if self.options.flags is None else self.options.flags), "-std=gnu99", "-fvisibility=hidden"]
+        flags += ["-Wno-unused-parameter", "-Wno-psabi"]
         slots, size = self.program.system.slots, self.program.size
         if self.options.engine == "casadi":
             sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
@@ -181,16 +224,25 @@ class Kernel:
             kernel = casadi_c.kernel_header(self.program, start)
             return {**runtime_sources(), **kernel}, tuple(slot.key for slot in slots), flags
         tunable = self.options.tunable
-        constants = {} if tunable is None else {
-            slot.key: value for slot, value in zip(slots, baked, strict=True) if slot.key not in tunable}
+        constants = (
+            {}
+            if tunable is None
+            else {slot.key: value for slot, value in zip(slots, baked, strict=True) if slot.key not in tunable}
+        )
         width = self.options.width or toolchain.native_vector_width()
         groups = self.options.groups or (2 if width > 1 else 1)
         emission = lanes.emit(self.program, constants, groups)
         start = preamble(self.program, width=width, groups=groups, sampled=sampled, sizes=emission.sizes)
         return {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}"}, emission.tunable, flags
 
-    def run(self, parameters: Floats, settings: LoopSettings, tables: Sequence[Table] = (), *,
-            control: Control | None = None) -> Runs:
+    def run(
+        self,
+        parameters: Floats,
+        settings: LoopSettings,
+        tables: Sequence[Table] = (),
+        *,
+        control: Control | None = None,
+    ) -> Runs:
         """Simulate one run per row of `parameters` (runs, len(self.parameters)), in this thread, without the GIL.
 
         Raises ValueError if `parameters` or `tables` do not have the shape the kernel was built for.
@@ -206,26 +258,44 @@ class Kernel:
         coefficients = [np.ascontiguousarray(table.coefficients, dtype=np.float64) for table in tables]
         for i, (table, layout, data) in enumerate(zip(tables, layouts, coefficients, strict=True)):
             if data.ndim != 3 or data.shape[1:] != (len(layout.channels), 4):
-                raise ValueError(f"table {layout.signal}: coefficients have shape {data.shape}, "
-                                 f"expected (intervals, {len(layout.channels)}, 4)")
-            c_tables[i] = _Table(table.t0, table.dt, data.shape[0], data.shape[1], int(table.periodic), data.ctypes.data)
+                raise ValueError(
+                    f"table {layout.signal}: coefficients have shape {data.shape}, "
+                    f"expected (intervals, {len(layout.channels)}, 4)"
+                )
+            c_tables[i] = _Table(
+                table.t0, table.dt, data.shape[0], data.shape[1], int(table.periodic), data.ctypes.data
+            )
         rows = settings.rows
         result = Runs(
             metrics=np.full((runs, self.program.system.n, len(METRICS)), np.nan),
-            final_state=np.zeros((runs, self._states)), end_time=np.zeros(runs),
-            status=np.zeros(runs, np.int32), quantity=np.full(runs, -1, np.int32),
+            final_state=np.zeros((runs, self._states)),
+            end_time=np.zeros(runs),
+            status=np.zeros(runs, np.int32),
+            quantity=np.full(runs, -1, np.int32),
             trajectory=np.full((runs, rows, self._columns), np.nan) if rows else None,
             rows=np.zeros(runs, np.int64) if rows else None,
         )
         job = _Job(
-            first=0, last=runs, steps=settings.steps, start_time=settings.start_time, step=settings.step,
-            bound=settings.bound, hold=settings.hold, output_every=settings.output_every,
-            response_band=settings.response_band, settling_band=settings.settling_band,
-            parameters=parameters.ctypes.data, tables=ctypes.addressof(c_tables), metrics=result.metrics.ctypes.data,
-            final_state=result.final_state.ctypes.data, end_time=result.end_time.ctypes.data,
-            status=result.status.ctypes.data, quantity=result.quantity.ctypes.data,
+            first=0,
+            last=runs,
+            steps=settings.steps,
+            start_time=settings.start_time,
+            step=settings.step,
+            bound=settings.bound,
+            hold=settings.hold,
+            output_every=settings.output_every,
+            response_band=settings.response_band,
+            settling_band=settings.settling_band,
+            parameters=parameters.ctypes.data,
+            tables=ctypes.addressof(c_tables),
+            metrics=result.metrics.ctypes.data,
+            final_state=result.final_state.ctypes.data,
+            end_time=result.end_time.ctypes.data,
+            status=result.status.ctypes.data,
+            quantity=result.quantity.ctypes.data,
             trajectory=result.trajectory.ctypes.data if result.trajectory is not None else None,
-            rows=result.rows.ctypes.data if result.rows is not None else None, capacity=rows,
+            rows=result.rows.ctypes.data if result.rows is not None else None,
+            capacity=rows,
             progress=ctypes.addressof(control.progress) if control else None,
             stop=ctypes.addressof(control.stop) if control else None,
         )
@@ -241,11 +311,15 @@ def runtime_sources() -> dict[str, str]:
 
 
 @lru_cache(maxsize=64)
-def kernel(structure: Structure, sampled: bool = False, options: KernelOptions | None = None,
-           baked: tuple[float, ...] = ()) -> Kernel:
+def kernel(
+    structure: Structure,
+    sampled: bool = False,
+    options: KernelOptions | None = None,
+    baked: tuple[float, ...] = (),
+) -> Kernel:
     """The Kernel of a structure, compiled on first need.
 
     baked  values of all slots, in their order, for a kernel with baked parameters; () when every slot is tunable
     Raises ToolchainError when there is no C compiler or it fails.
     """
-    return Kernel(structure, sampled, options or KernelOptions(), baked)
+    return Kernel(program(structure), sampled, options or KernelOptions(), baked)

@@ -9,8 +9,11 @@ processor always has something independent to do.
 from __future__ import annotations
 
 import heapq
+import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import casadi as ca
 
@@ -19,10 +22,24 @@ from springline.codegen.program import Program
 from springline.model.base import COORDINATES
 
 _VECTOR_CALLS = {
-    ca.OP_SQRT: "sqrt", ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_LOG1P: "log1p", ca.OP_EXPM1: "expm1",
-    ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan", ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow",
-    ca.OP_FABS: "fabs", ca.OP_SIGN: "sign", ca.OP_FMIN: "fmin", ca.OP_FMAX: "fmax", ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil", ca.OP_COPYSIGN: "copysign", ca.OP_HYPOT: "hypot",
+    ca.OP_SQRT: "sqrt",
+    ca.OP_EXP: "exp",
+    ca.OP_LOG: "log",
+    ca.OP_LOG1P: "log1p",
+    ca.OP_EXPM1: "expm1",
+    ca.OP_SIN: "sin",
+    ca.OP_COS: "cos",
+    ca.OP_TAN: "tan",
+    ca.OP_POW: "pow",
+    ca.OP_CONSTPOW: "pow",
+    ca.OP_FABS: "fabs",
+    ca.OP_SIGN: "sign",
+    ca.OP_FMIN: "fmin",
+    ca.OP_FMAX: "fmax",
+    ca.OP_FLOOR: "floor",
+    ca.OP_CEIL: "ceil",
+    ca.OP_COPYSIGN: "copysign",
+    ca.OP_HYPOT: "hypot",
 }
 _INFIX = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARISONS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
@@ -31,18 +48,48 @@ _MASKS = frozenset({*_COMPARISONS, *_LOGIC, ca.OP_NOT})
 
 # Exponents for which sl_pow is defined as a kernel of its own (sl_math.h); the nearest double where it is a third.
 SPECIAL_POWERS = {
-    1 / 3: "p1_3", -1 / 3: "m1_3", 2 / 3: "p2_3", -2 / 3: "m2_3", 0.5: "p1_2", -0.5: "m1_2", 1.5: "p3_2",
-    1.0: "p1", 2.0: "p2", 3.0: "p3",
+    1 / 3: "p1_3",
+    -1 / 3: "m1_3",
+    2 / 3: "p2_3",
+    -2 / 3: "m2_3",
+    0.5: "p1_2",
+    -0.5: "m1_2",
+    1.5: "p3_2",
+    1.0: "p1",
+    -1.0: "m1",
+    2.0: "p2",
+    3.0: "p3",
 }
 
 # Rough latencies in cycles: they only decide the order of statements.
 _LATENCY = {
-    ca.OP_DIV: 13, ca.OP_INV: 13, ca.OP_SQRT: 20, ca.OP_EXP: 45, ca.OP_LOG: 55, ca.OP_LOG1P: 60, ca.OP_EXPM1: 60,
-    ca.OP_SIN: 45, ca.OP_COS: 45, ca.OP_TAN: 60, ca.OP_POW: 110, ca.OP_CONSTPOW: 60, ca.OP_HYPOT: 40,
+    ca.OP_DIV: 13,
+    ca.OP_INV: 13,
+    ca.OP_SQRT: 20,
+    ca.OP_EXP: 45,
+    ca.OP_LOG: 55,
+    ca.OP_LOG1P: 60,
+    ca.OP_EXPM1: 60,
+    ca.OP_SIN: 45,
+    ca.OP_COS: 45,
+    ca.OP_TAN: 60,
+    ca.OP_POW: 110,
+    ca.OP_CONSTPOW: 60,
+    ca.OP_HYPOT: 40,
 }
 _SIMPLE_LATENCY = 3
 
+# Functions with rare cases outside their fast path; slv_<name>_fast(x, &ok) clears ok where that does not hold.
+_FAST = frozenset({
+    "exp", "expm1", "log", "log1p", "sin", "cos", "sincos", "tan", "hypot", "pow",
+    *(f"pow_{power}" for power in ("p1_3", "m1_3", "p2_3", "m2_3", "p1_2", "m1_2", "p3_2")),
+})  # fmt: skip
+
 _NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
+
+
+Load = Callable[[int, str], str]
+Store = Callable[[int, str, str], str]
 
 
 class UnprintableOperation(ValueError):
@@ -67,11 +114,11 @@ class Emission:
 
 def literal(value: float) -> str:
     """A C literal that reads back as the same double."""
-    if value != value:
+    if math.isnan(value):
         return "SL_NAN"
-    if value in (float("inf"), float("-inf")):
+    if math.isinf(value):
         return "SL_INF" if value > 0 else "-SL_INF"
-    text = repr(value)
+    text = repr(float(value))
     return text if any(c in text for c in ".e") else text + ".0"
 
 
@@ -80,7 +127,13 @@ class _Emitter:
         self.program = program
         self.graph = Graph(program, baked)
         self.groups = groups
-        self.slots: dict[Binding, dict[int, int]] = {Binding.RUN: {}, Binding.UNIFORM: {}, Binding.VARYING: {}}
+        self.speculate = not baked
+        self.defaults = [slot.default for slot in program.system.slots]
+        self.slots: dict[Binding, dict[int, int]] = {
+            Binding.RUN: {},
+            Binding.UNIFORM: {},
+            Binding.VARYING: {},
+        }
         self.names = self._names()
         self.counts: dict[str, int] = {}
         outputs = self.graph.outputs
@@ -93,7 +146,7 @@ class _Emitter:
         }
         n = program.system.n
         w = outputs["signals"][0]
-        self.observed = [*w[:n], *w[3 * n:3 * n + len(COORDINATES)]]
+        self.observed = [*w[:n], *w[3 * n : 3 * n + len(COORDINATES)]]
         for wanted in (*self.state_functions.values(), self.observed, outputs["start"][0]):
             self._keep(wanted, Binding.STATE)
         self._keep(list(self.slots[Binding.VARYING]), Binding.VARYING)
@@ -169,7 +222,20 @@ class _Emitter:
     def _label(self, i: int, suffix: str) -> str:
         return self.names.get(i, f"a{i}") + suffix
 
-    def _expression(self, i: int, ref: Callable[[int], str], mask: Callable[[int], str]) -> str:
+    def _assumed_power(self, exponent: int) -> float | None:
+        """The special exponent that a run-time exponent has at the parameters' default values, if it has one."""
+        if not self.speculate or self.graph.nodes[exponent].binding is not Binding.RUN:
+            return None
+        value = self.graph.value_at(exponent, self.defaults)
+        return value if value in SPECIAL_POWERS else None
+
+    def _call(self, name: str, arguments: Sequence[str], ok: str | None) -> str:
+        if ok is not None and name in _FAST:
+            return f"slv_{name}_fast({', '.join([*arguments, f'&{ok}'])})"
+        return f"slv_{name}({', '.join(arguments)})"
+
+    def _expression(self, i: int, ref: Callable[[int], str], mask: Callable[[int], str], ok: str | None) -> str:
+        """C expression of an operation; with `ok`, fast paths that clear it in the lanes where they do not hold."""
         node = self.graph.nodes[i]
         op, arguments = node.op, node.arguments
         assert op is not None
@@ -184,11 +250,13 @@ class _Emitter:
         if op == ca.OP_INV:
             return f"slv_set(1.0) / {ref(arguments[0])}"
         if op in (ca.OP_POW, ca.OP_CONSTPOW):
-            exponent = self.graph.nodes[arguments[1]]
-            if exponent.binding is Binding.CONSTANT and exponent.value in SPECIAL_POWERS:
-                return f"slv_pow_{SPECIAL_POWERS[exponent.value]}({ref(arguments[0])})"
+            exponent: float | None = self.graph.nodes[arguments[1]].value
+            if ok is not None and exponent not in SPECIAL_POWERS:
+                exponent = self._assumed_power(arguments[1])
+            if exponent in SPECIAL_POWERS:
+                return self._call(f"pow_{SPECIAL_POWERS[exponent]}", [ref(arguments[0])], ok)
         if op in _VECTOR_CALLS:
-            return f"slv_{_VECTOR_CALLS[op]}({', '.join(ref(a) for a in arguments)})"
+            return self._call(_VECTOR_CALLS[op], [ref(a) for a in arguments], ok)
         if op in _COMPARISONS:
             return f"{ref(arguments[0])} {_COMPARISONS[op]} {ref(arguments[1])}"
         if op in _LOGIC:
@@ -197,184 +265,236 @@ class _Emitter:
             return f"slv_not({mask(arguments[0])})"
         if op == ca.OP_IF_ELSE_ZERO:
             return f"slv_if({mask(arguments[0])}, {ref(arguments[1])})"
-        raise UnprintableOperation(f"the lane emitter cannot print the operation {_NAMES.get(op, op)}; "
-                                   "sl_math.h has no function for it")
+        raise UnprintableOperation(
+            f"the lane emitter cannot print the operation {_NAMES.get(op, op)} of the Function {node.origin!r}: "
+            "sl_math.h has no function for it"
+        )
 
-    def body(self, wanted: Sequence[int], binding: Binding, load: Callable[[int, str], str], groups: int,
-             store: Callable[[int, int, str, str], str], indent: str = "  ") -> tuple[list[str], int]:
-        """Statements that compute `wanted` and store them.
+    def _body(
+        self,
+        wanted: Sequence[int],
+        binding: Binding,
+        load: Load,
+        store: Store,
+        groups: Sequence[str],
+        indent: str,
+        fast: bool = False,
+    ) -> tuple[list[str], int]:
+        """Statements that compute `wanted` and store them, and how many operations that takes per run.
 
-        load(node, group)  C expression of a value that is given;  store(position, node, value, group) a statement
-        Returns the lines and the number of operations per run.
+        load    (node, group) -> C expression of a value that is given
+        store   (position in wanted, value, group) -> a statement
+        groups  C expressions of the group index that each statement is printed for, side by side
+        fast    fast paths only; the masks ok, ok_0, ... tell where they hold
         """
         nodes = self.graph.nodes
         order = self._schedule(self.graph.needed(wanted, binding))
-        done: set[int] = set()
+        suffixes = [f"_{g}" if len(groups) > 1 else "" for g in groups]
+        computed = set(order)
+        present: set[int] = set()
+        tested: set[int] = set()
         lines: list[str] = []
-        pending = list(order)
-        loaded: set[int] = set()
-        suffixes = [f"_{g}" if groups > 1 else "" for g in range(groups)]
-        angles = {nodes[i].arguments[0]: set() for i in order if nodes[i].op in (ca.OP_SIN, ca.OP_COS)}  # type: dict[int, set[int]]
-        for i in order:
-            if nodes[i].op in (ca.OP_SIN, ca.OP_COS):
-                angles[nodes[i].arguments[0]].add(i)
 
-        def group(suffix: str) -> str:
-            return suffix[1:] if suffix else "0" if groups == 1 and binding is Binding.STATE else "g"
-
-        def reference(suffix: str) -> Callable[[int], str]:
-            def ref(i: int) -> str:
-                node = nodes[i]
-                if node.binding is Binding.CONSTANT:
-                    return f"slv_set({literal(node.value)})"
-                label = self._label(i, suffix)
-                return f"slv_true({label})" if node.op in _MASKS and i in done else label
-            return ref
-
-        def truth(suffix: str) -> Callable[[int], str]:
-            def mask(i: int) -> str:
-                if nodes[i].op in _MASKS and i in done:
-                    return self._label(i, suffix)
-                return f"({reference(suffix)(i)} != slv_set(0.0))"
-            return mask
-
-        def ensure_loaded(i: int) -> None:
-            if i in done or i in loaded or nodes[i].binding is Binding.CONSTANT:
-                return
-            loaded.add(i)
-            lines.extend(f"{indent}const sl_v {self._label(i, s)} = {load(i, group(s))};" for s in suffixes)
-
-        for i in pending:
-            if i in done:
-                continue
+        def reference(i: int, suffix: str) -> str:
             node = nodes[i]
-            for a in node.arguments:
-                ensure_loaded(a)
-            if node.op in (ca.OP_SIN, ca.OP_COS) and len(angles[node.arguments[0]]) == 2:
-                a = node.arguments[0]
-                sine, cosine = sorted(angles[a], key=lambda k: nodes[k].op != ca.OP_SIN)
-                for k, function in ((sine, "sin"), (cosine, "cos")):
-                    if k not in self.names and a in self.names:
-                        self.names[k] = f"{function}_{self.names[a]}"
-                for s in suffixes:
-                    lines.append(f"{indent}sl_v {self._label(sine, s)}, {self._label(cosine, s)};")
-                for s in suffixes:
-                    lines.append(f"{indent}slv_sincos({reference(s)(a)}, &{self._label(sine, s)}, &{self._label(cosine, s)});")
-                done |= {sine, cosine}
+            if node.binding is Binding.CONSTANT:
+                return f"slv_set({literal(node.value)})"
+            label = self._label(i, suffix)
+            return f"slv_true({label})" if node.op in _MASKS and i in computed else label
+
+        def mask(i: int, suffix: str) -> str:
+            if nodes[i].op in _MASKS and i in computed:
+                return self._label(i, suffix)
+            return f"({reference(i, suffix)} != slv_set(0.0))"
+
+        def fetch(i: int) -> None:
+            if i in computed or i in present or nodes[i].binding is Binding.CONSTANT:
+                return
+            present.add(i)
+            lines.extend(
+                f"{indent}const sl_v {self._label(i, s)} = {load(i, g)};" for s, g in zip(suffixes, groups, strict=True)
+            )
+
+        sines = {nodes[i].arguments[0]: i for i in order if nodes[i].op == ca.OP_SIN}
+        cosines = {nodes[i].arguments[0]: i for i in order if nodes[i].op == ca.OP_COS}
+        for i in order:
+            if i in present:
                 continue
-            kind = "sl_m" if node.op in _MASKS else "sl_v"
+            op, arguments = nodes[i].op, nodes[i].arguments
+            for a in arguments:
+                fetch(a)
+            angle = arguments[0]
+            if op in (ca.OP_SIN, ca.OP_COS) and angle in sines and angle in cosines:
+                pair = (sines[angle], cosines[angle])
+                for k, function in zip(pair, ("sin", "cos"), strict=True):
+                    if angle in self.names:
+                        self.names.setdefault(k, f"{function}_{self.names[angle]}")
+                for s in suffixes:
+                    sine, cosine = (self._label(k, s) for k in pair)
+                    lines.append(f"{indent}sl_v {sine}, {cosine};")
+                    call = self._call(
+                        "sincos", [reference(angle, s), f"&{sine}", f"&{cosine}"], f"ok{s}" if fast else None
+                    )
+                    lines.append(f"{indent}{call};")
+                present.update(pair)
+                continue
+            if fast and op in (ca.OP_POW, ca.OP_CONSTPOW):
+                assumed = self._assumed_power(arguments[1])
+                if assumed is not None and arguments[1] not in tested:
+                    tested.add(arguments[1])
+                    lines.extend(
+                        f"{indent}ok{s} = ok{s} & ({reference(arguments[1], s)} == slv_set({literal(assumed)}));"
+                        for s in suffixes
+                    )
+            kind = "sl_m" if op in _MASKS else "sl_v"
             for s in suffixes:
-                lines.append(f"{indent}const {kind} {self._label(i, s)} = {self._expression(i, reference(s), truth(s))};")
-            done.add(i)
+                ok = f"ok{s}" if fast else None
+                expression = self._expression(i, partial(reference, suffix=s), partial(mask, suffix=s), ok)
+                lines.append(f"{indent}const {kind} {self._label(i, s)} = {expression};")
+            present.add(i)
         for i in wanted:
-            ensure_loaded(i)
+            fetch(i)
         for position, i in enumerate(wanted):
-            lines.extend(indent + store(position, i, reference(s)(i), group(s)) for s in suffixes)
+            lines.extend(indent + store(position, reference(i, s), g) for s, g in zip(suffixes, groups, strict=True))
         return lines, len(order)
 
     # -- functions --------------------------------------------------------------------------------------------
 
     def _given(self, i: int, group: str) -> str:
-        """C expression of a value from an earlier binding time, or of an input, for a group of runs."""
+        """C expression of an input, or of a value from an earlier binding time, for a group of runs."""
         node = self.graph.nodes[i]
-        if node.op is None:
-            name, k = node.source
-            if name in ("p", "x", "u"):
-                return f"{name}[{k}][{group}]"
+        name, k = node.source
+        if name in ("p", "x", "u"):
+            return f"{name}[{k}][{group}]"
         if node.binding is Binding.RUN:
             return f"r[{self.slots[Binding.RUN][i]}][{group}]"
         if node.binding is Binding.UNIFORM:
             return f"slv_set(now.uniform[{self.slots[Binding.UNIFORM][i]} * SL_W])"
         return f"now.varying[{self.slots[Binding.VARYING][i]}][{group}]"
 
-    def _per_group(self, name: str, signature: str, wanted: Sequence[int], binding: Binding,
-                   target: str, load: Callable[[int, str], str] | None = None, before: str = "") -> str:
-        """A rarely called function: one loop over the groups."""
-        lines, self.counts[name] = self.body(
-            wanted, binding, load or self._given, 1,
-            lambda position, _i, value, group: f"{target}[{position}][g] = {value};", indent="    ")
-        body = "\n".join([f"  for (g = 0; g < SL_G; g++) {{{before}", *lines, "  }"]) if wanted else ""
-        unused = ", ".join(f"(void){word.split('*')[-1].split()[-1]}" for word in signature.split(", "))
-        return f"static inline void kernel_{name}({signature}) {{\n  int g;\n{body}\n  (void)g, {unused};\n}}\n".replace(
-            "  int g;\n\n  (void)g, ", "  ")
+    def _given_at_one_time(self, i: int, group: str) -> str:
+        """As `_given`, in the function that computes what varies from run to run at one time t."""
+        node = self.graph.nodes[i]
+        name, k = node.source
+        if name in ("t", "d"):
+            return "slv_set(t)" if name == "t" else f"slv_set(d[{k}])"
+        if node.binding is Binding.UNIFORM:
+            return f"slv_set(uniform[{self.slots[Binding.UNIFORM][i]} * SL_W])"
+        return self._given(i, group)
+
+    def _given_at_many_times(self, i: int, _group: str) -> str:
+        """As `_given`, in the function that computes what all runs share, at SL_W times in one vector."""
+        name, k = self.graph.nodes[i].source
+        return "slv_load(t)" if name == "t" else f"slv_load(d + {k} * SL_W)"
+
+    def _function(
+        self,
+        name: str,
+        signature: str,
+        wanted: Sequence[int],
+        binding: Binding,
+        target: Callable[[int, str], str],
+        load: Load,
+        groups: Sequence[str],
+    ) -> str:
+        """One C function; with groups ["g"] its body is a loop over the groups of a pack."""
+        looped = list(groups) == ["g"]
+        lines, count = self._body(
+            wanted, binding, load, lambda k, value, g: f"{target(k, g)} = {value};", groups, "    " if looped else "  "
+        )
+        self.counts[name] = count
+        if looped:
+            lines = ["  int g;", "  for (g = 0; g < SL_G; g++) {", *lines, "  }"] if lines else []
+        head = f"/* {count} operations a run */\nstatic inline void kernel_{name}({signature}) {{"
+        return "\n".join([head, *lines, "}\n"])
 
     def text(self) -> str:
         """All functions of the kernel."""
-        system, outputs = self.program.system, self.graph.outputs
-        n = system.n
+        n, outputs = self.program.system.n, self.graph.outputs
+        run, uniform, varying = (list(self.slots[b]) for b in (Binding.RUN, Binding.UNIFORM, Binding.VARYING))
         given = "const sl_group *p, const sl_group *r"
-        run_wanted = list(self.slots[Binding.RUN])
-        pieces = [
-            "/* ---- once per run ---- */\n",
-            self._per_group("run", "const sl_group *p, sl_group *r", run_wanted, Binding.RUN, "r",
-                            load=lambda i, g: f"p[{self.graph.nodes[i].source[1]}][{g}]"),
-            self._per_group("start", f"{given}, sl_group *x", outputs["start"][0], Binding.STATE, "x"),
-            "/* ---- once per time ---- */\n",
-            self._uniform(),
-            self._varying(given),
-            self._signals(),
-            "/* ---- at every evaluation ---- */\n",
-        ]
-        control = [("u", n), ("e", n), ("sigma", n)]
-        pieces += [
-            self._state("closed", "", [("dx", 4 * n), *control]),
-            self._state("control", "", control),
-            self._state("error", "", control[1:]),
-            self._state("plant", "const sl_group *u, ", [("dx", 4 * n)]),
-        ]
-        return "\n".join(pieces)
+        now = "sl_time now, const sl_group *x"
+        control = {"u": n, "e": n, "sigma": n}
 
-    def _state(self, name: str, inputs: str, results: Sequence[tuple[str, int]]) -> str:
-        targets = [f"{result}[{i}]" for result, count in results for i in range(count)]
-        lines, count = self.body(self.state_functions[name], Binding.STATE, self._given, self.groups,
-                                 lambda position, _i, value, group: f"{targets[position]}[{group}] = {value};")
-        self.counts[name] = count
-        arguments = ", ".join(f"sl_group *{result}" for result, _ in results)
-        unused = ", ".join(f"(void){word}" for word in ("now", "x", *(["u"] if inputs else []), "p", "r"))
-        return (f"/* {count} operations a run */\n"
-                f"static inline void kernel_{name}(sl_time now, const sl_group *x, {inputs}const sl_group *p, "
-                f"const sl_group *r,\n    {arguments}) {{\n" + "\n".join(lines) + f"\n  {unused};\n}}\n")
+        def into(name: str) -> Callable[[int, str], str]:
+            return lambda k, g: f"{name}[{k}][{g}]"
 
-    def _uniform(self) -> str:
-        """Values that all runs share, for SL_W times at once."""
-        wanted = list(self.slots[Binding.UNIFORM])
+        def state(name: str, signature: str, results: Mapping[str, int]) -> str:
+            """A fast version, and one that knows the rare cases and is called where the fast one does not hold."""
+            targets = [f"{result}[{i}]" for result, count in results.items() for i in range(count)]
+            arguments = f"{signature}, {given},\n    {', '.join(f'sl_group *{result}' for result in results)}"
+            names = ", ".join(re.findall(r"\w+(?=,|$)", arguments))
+            groups = [str(g) for g in range(self.groups)]
+            wanted = self.state_functions[name]
 
-        def load(i: int, _group: str) -> str:
-            name, k = self.graph.nodes[i].source
-            return "slv_load(t)" if name == "t" else f"slv_load(d + {k} * SL_W)"
+            def target(k: int, g: str) -> str:
+                return f"{targets[k]}[{g}]"
 
-        lines, self.counts["uniform"] = self.body(wanted, Binding.UNIFORM, load, 1,
-                                                  lambda position, _i, value, _g: f"uniform[{position}] = {value};")
-        return ("static inline void kernel_uniform(const double *t, const double *d, sl_v *uniform) {\n"
-                + "\n".join(lines) + "\n  (void)t, (void)d, (void)uniform;\n}\n")
+            checked = self._function(f"{name}_checked", arguments, wanted, Binding.STATE, target, self._given, ["g"])
+            masks = [f"ok_{g}" if self.groups > 1 else "ok" for g in groups]
+            lines, self.counts[name] = self._body(
+                wanted,
+                Binding.STATE,
+                self._given,
+                lambda k, value, g: f"{target(k, g)} = {value};",
+                groups,
+                "  ",
+                fast=True,
+            )
+            fast = [
+                f"/* {self.counts[name]} operations a run */",
+                f"static inline void kernel_{name}({arguments}) {{",
+                *(f"  sl_m {mask} = slv_yes();" for mask in masks),
+                *lines,
+                f"  if (!SL_LIKELY(slv_all({' & '.join(masks)}))) kernel_{name}_checked({names});",
+                "}\n",
+            ]
+            return "\n".join([checked.replace("static inline", "SL_RARE"), *fast])
 
-    def _varying(self, given: str) -> str:
-        """Values that depend on time and on a run's own parameters."""
-        wanted = list(self.slots[Binding.VARYING])
-
-        def load(i: int, group: str) -> str:
-            node = self.graph.nodes[i]
-            if node.op is None and node.source[0] == "t":
-                return "slv_set(t)"
-            if node.op is None and node.source[0] == "d":
-                return f"slv_set(d[{node.source[1]}])"
-            if node.binding is Binding.UNIFORM:
-                return f"slv_set(uniform[{self.slots[Binding.UNIFORM][i]} * SL_W])"
-            return self._given(i, group)
-
-        return self._per_group("varying", f"double t, const double *d, const double *uniform, {given}, sl_group *varying",
-                               wanted, Binding.VARYING, "varying", load)
-
-    def _signals(self) -> str:
-        n = self.program.system.n
-        lines = []
-        for position, i in enumerate(self.observed):
-            target = f"q1d[{position}]" if position < n else f"b[{position - n}]"
-            node = self.graph.nodes[i]
-            value = f"slv_set({literal(node.value)})" if node.binding is Binding.CONSTANT else self._given(i, "g")
-            lines.append(f"    {target}[g] = {value};")
-        return ("static inline void kernel_signals(sl_time now, const sl_group *p, const sl_group *r, sl_group *q1d, sl_group *b) {\n  int g;\n"
-                "  for (g = 0; g < SL_G; g++) {\n" + "\n".join(lines) + "\n  }\n  (void)now, (void)p, (void)r;\n}\n")
+        return "\n".join(
+            [
+                "/* ---- once per run ---- */\n",
+                self._function(
+                    "run", "const sl_group *p, sl_group *r", run, Binding.RUN, into("r"), self._given, ["g"]
+                ),
+                self._function(
+                    "start", f"{given}, sl_group *x", outputs["start"][0], Binding.STATE, into("x"), self._given, ["g"]
+                ),
+                "/* ---- once per time: for all runs, then for each ---- */\n",
+                self._function(
+                    "uniform",
+                    "const double *t, const double *d, sl_v *uniform",
+                    uniform,
+                    Binding.UNIFORM,
+                    lambda k, _g: f"uniform[{k}]",
+                    self._given_at_many_times,
+                    ["0"],
+                ),
+                self._function(
+                    "varying",
+                    f"double t, const double *d, const double *uniform, {given},\n    sl_group *varying",
+                    varying,
+                    Binding.VARYING,
+                    into("varying"),
+                    self._given_at_one_time,
+                    ["g"],
+                ),
+                self._function(
+                    "signals",
+                    f"sl_time now, {given}, sl_group *q1d, sl_group *b",
+                    self.observed,
+                    Binding.STATE,
+                    lambda k, g: f"q1d[{k}][{g}]" if k < n else f"b[{k - n}][{g}]",
+                    self._given,
+                    ["g"],
+                ),
+                "/* ---- at every evaluation ---- */\n",
+                state("closed", now, {"dx": 4 * n, **control}),
+                state("control", now, control),
+                state("error", now, {"e": n, "sigma": n}),
+                state("plant", f"{now}, const sl_group *u", {"dx": 4 * n}),
+            ]
+        )
 
 
 def emit(program: Program, baked: Mapping[str, float], groups: int) -> Emission:
@@ -386,6 +506,10 @@ def emit(program: Program, baked: Mapping[str, float], groups: int) -> Emission:
     """
     emitter = _Emitter(program, baked, groups)
     text = emitter.text()
-    sizes = {"p": len(emitter.graph.tunable), "r": len(emitter.slots[Binding.RUN]),
-             "uniform": len(emitter.slots[Binding.UNIFORM]), "varying": len(emitter.slots[Binding.VARYING])}
+    sizes = {
+        "p": len(emitter.graph.tunable),
+        "r": len(emitter.slots[Binding.RUN]),
+        "uniform": len(emitter.slots[Binding.UNIFORM]),
+        "varying": len(emitter.slots[Binding.VARYING]),
+    }
     return Emission(text, sizes, emitter.graph.tunable, emitter.counts)

@@ -34,9 +34,15 @@ class Program:
     def size(self, name: str) -> int:
         """Number of entries of a vector of the loop: t, d, p, r, w, s, x, u, e."""
         sizes = {
-            "p": self.system.p.numel(), "d": self.system.d.numel(), "w": self.system.w.numel(),
-            "x": self.system.x.numel(), "u": self.system.n, "e": self.system.n, "t": 1,
-            "r": self.functions["run"].numel_out(0), "s": self.functions["time"].numel_out(0),
+            "p": self.system.p.numel(),
+            "d": self.system.d.numel(),
+            "w": self.system.w.numel(),
+            "x": self.system.x.numel(),
+            "u": self.system.n,
+            "e": self.system.n,
+            "t": 1,
+            "r": self.functions["run"].numel_out(0),
+            "s": self.functions["time"].numel_out(0),
         }
         return sizes[name]
 
@@ -59,10 +65,18 @@ def program(structure: Structure) -> Program:
     t, d, w, x, u, p = system.t, system.d, system.w, system.x, system.u, system.p
     loop = {name: system.function(f"loop_{name}") for name in ("error", "control", "plant")}
     sources = {"signals": system.function("signals"), "start": system.function("start"), **loop}
-    inputs = {"signals": [t, d, p], "start": [p], "error": [w, x, p], "control": [w, x, p], "plant": [w, x, u, p]}
+    inputs = {
+        "signals": [t, d, p],
+        "start": [p],
+        "error": [w, x, p],
+        "control": [w, x, p],
+        "plant": [w, x, u, p],
+    }
 
     with as_written():
-        expressions = {name: [f(*inputs[name])] if f.n_out() == 1 else list(f(*inputs[name])) for name, f in sources.items()}
+        expressions = {
+            name: [f(*inputs[name])] if f.n_out() == 1 else list(f(*inputs[name])) for name, f in sources.items()
+        }
         names = list(expressions)
         flat = [e for name in names for e in expressions[name]]
         (run,), rest = split(flat, [("r", p)])

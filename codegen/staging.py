@@ -45,6 +45,6 @@ def split(expressions: Sequence[ca.SX], levels: Sequence[tuple[str, ca.SX]]) -> 
             known.append(names)
         pieces, start = [], 0
         for rows, columns in shapes:
-            pieces.append(ca.reshape(rest[start:start + rows * columns], rows, columns))
+            pieces.append(ca.reshape(rest[start : start + rows * columns], rows, columns))
             start += rows * columns
     return stages, pieces

@@ -2,7 +2,7 @@
 
 The base frame is moved by y_r1 along the inertial Y and turned by R = Rz(theta_1z) Rx(theta_1x) (PAPER E7: pitch, then
 roll about the pitched x axis). The arm feels the base only through what an inertial measurement unit at the base
-origin reads: the angular velocity, its derivative, and the specific force (gravity plus acceleration), all in base axes.
+origin reads: the angular velocity, its derivative, and the specific force (gravity plus acceleration), in base axes.
 """
 
 from __future__ import annotations
@@ -58,3 +58,9 @@ class BaseMotion:
     def specific_force(self, g: ca.SX) -> ca.SX:
         """(g + acceleration of the shake) along the inertial Y, 3 x 1, m/s^2, base axes; [0, g, 0] at rest."""
         return self.rotation.T @ ca.vertcat(0, g + self.ddb[0], 0)
+
+    def excess_force(self, g: ca.SX) -> ca.SX:
+        """`specific_force` less [0, g, 0], 3 x 1, m/s^2, written so that a small excess keeps its digits."""
+        level = ca.vertcat(0, 1, 0)
+        up = self.rotation.T @ level
+        return g * (up - level) + self.ddb[0] * up

@@ -36,8 +36,16 @@ def fast_control(dq1: ca.SX, dq2: ca.SX, gain: ca.SX) -> ca.SX:
     return gain * (dq1 - dq2)
 
 
-def control(reference: tuple[ca.SX, ca.SX, ca.SX], x: ca.SX, nominal: EquationsOfMotion, motor_inertia: ca.SX,
-            p: Values, law: ReachingLaw, log_form: LogForm, exponents: SurfaceExponents) -> ControlSignals:
+def control(
+    reference: tuple[ca.SX, ca.SX, ca.SX],
+    x: ca.SX,
+    nominal: EquationsOfMotion,
+    motor_inertia: ca.SX,
+    p: Values,
+    law: ReachingLaw,
+    log_form: LogForm,
+    exponents: SurfaceExponents,
+) -> ControlSignals:
     """The composite law U = U_s + U_f, limited per motor to +-U_max                                (13), (25), E4.
 
     reference  q1d, dq1d, ddq1d, each n x 1

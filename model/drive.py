@@ -1,7 +1,7 @@
 """Series elastic drive and the full-order plant (PAPER section 2).
 
-    M1 ddq1 + C dq1 + G + K (q1 - q2) = S
-    M2 ddq2 + K (q2 - q1) = U                                                                             (1)
+M1 ddq1 + C dq1 + G + K (q1 - q2) = S
+M2 ddq2 + K (q2 - q1) = U                                                                             (1)
 """
 
 from __future__ import annotations

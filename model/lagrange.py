@@ -18,25 +18,59 @@ import casadi as ca
 from springline.model.base import BaseMotion
 from springline.model.normal_form import collect
 from springline.model.parameters import Joint, Parameter, Values
+from springline.model.signals import SineTerm
 
 
 class Mechanism(Protocol):
     """What a mechanism has to tell: its joints, its parameters, and two energies.
 
     `parameters` must contain "g". `motor_inertia` and `stiffness` declare the series elastic drive, one per joint.
+    `reference_*` and `start_*` are a scenario's defaults, one per joint.
     kinetic_energy(q, dq, omega, p): J; velocities are jtimes(r, q, dq) + cross(omega, r), base axes
     potential_energy(q, gravity, p): J; `gravity` is a 3 x 1 vector that points up, m/s^2, base axes
     """
 
-    name: str
-    joints: tuple[Joint, ...]
-    parameters: tuple[Parameter, ...]
-    motor_inertia: tuple[Parameter, ...]
-    stiffness: tuple[Parameter, ...]
+    @property
+    def name(self) -> str:
+        """Name in scenario files."""
 
-    def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX: ...
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints, in the order of q."""
 
-    def potential_energy(self, q: ca.SX, gravity: ca.SX, p: Values) -> ca.SX: ...
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Parameters of the two energies."""
+
+    @property
+    def motor_inertia(self) -> tuple[Parameter, ...]:
+        """Diagonal of M2, one per joint."""
+
+    @property
+    def stiffness(self) -> tuple[Parameter, ...]:
+        """Diagonal of K, one per joint."""
+
+    @property
+    def reference_offset(self) -> tuple[float, ...]:
+        """Constant part of the desired trajectory."""
+
+    @property
+    def reference_terms(self) -> tuple[tuple[SineTerm, ...], ...]:
+        """Sine terms of the desired trajectory."""
+
+    @property
+    def start_position(self) -> tuple[float, ...]:
+        """Initial joint coordinates."""
+
+    @property
+    def start_rate(self) -> tuple[float, ...]:
+        """Initial joint rates."""
+
+    def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX:
+        """T, J, seen from a frame that moves with the base origin."""
+
+    def potential_energy(self, q: ca.SX, gravity: ca.SX, p: Values) -> ca.SX:
+        """V, J."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +100,10 @@ def equations_of_motion(mechanism: Mechanism, q: ca.SX, dq: ca.SX, base: BaseMot
     momentum = ca.gradient(kinetic, dq)
     mass = ca.jacobian(momentum, dq)
     moving = (
-        ca.jtimes(momentum, q, dq) + ca.jtimes(momentum, omega, alpha)
-        - ca.gradient(kinetic, q) + ca.gradient(potential, q)
+        ca.jtimes(momentum, q, dq)
+        + ca.jtimes(momentum, omega, alpha)
+        - ca.gradient(kinetic, q)
+        + ca.gradient(potential, q)
     )
     at_rest = [ca.SX.zeros(3), ca.SX.zeros(3), ca.vertcat(0, p.g, 0)]
     rest = ca.substitute(moving, ca.vertcat(omega, alpha, gravity), ca.vertcat(*at_rest))
@@ -81,13 +117,14 @@ def equations_of_motion(mechanism: Mechanism, q: ca.SX, dq: ca.SX, base: BaseMot
 
     felt = ca.vertcat(base.omega, base.alpha, base.specific_force(p.g))
 
-    def with_base(expression: ca.SX) -> ca.SX:
-        return ca.substitute(normal(expression), imu, felt)
+    # S against gravity's excess over its value at rest: the weight cancels here, not in rounded numbers.
+    tilted = ca.substitute(rest - moving, gravity, at_rest[2] + gravity)
+    felt_excess = ca.vertcat(base.omega, base.alpha, base.excess_force(p.g))
 
     return EquationsOfMotion(
         mass=normal(mass),
         coriolis=normal(rest - weight),
         gravity=normal(weight),
-        disturbance=with_base(rest - moving),
-        bias=with_base(moving),
+        disturbance=ca.substitute(normal(tilted), imu, felt_excess),
+        bias=ca.substitute(normal(moving), imu, felt),
     )

@@ -11,11 +11,12 @@ import casadi as ca
 @contextmanager
 def as_written() -> Iterator[None]:
     """Within this block CasADi builds expressions literally, without rewriting a * (1/b) into a / b and the like."""
+    before = ca.GlobalOptions.getSimplificationOnTheFly()
     ca.GlobalOptions.setSimplificationOnTheFly(False)
     try:
         yield
     finally:
-        ca.GlobalOptions.setSimplificationOnTheFly(True)
+        ca.GlobalOptions.setSimplificationOnTheFly(before)
 
 
 def over(a: ca.SX, b: ca.SX) -> ca.SX:

@@ -8,7 +8,7 @@ only on time, can be computed once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import casadi as ca
 
@@ -123,44 +123,51 @@ def _polynomials(function: ca.Function, symbols: ca.SX, atoms: _Atoms) -> list[P
 
 def _apply(op: int, arguments: Sequence[ca.SX]) -> ca.SX:
     """The SX operation with the opcode `op`; an unknown one is refused by name."""
-    table = {
-        ca.OP_DIV: lambda a, b: a / b, ca.OP_INV: lambda a: 1 / a, ca.OP_SQRT: ca.sqrt, ca.OP_EXP: ca.exp,
-        ca.OP_LOG: ca.log, ca.OP_POW: lambda a, b: a**b, ca.OP_CONSTPOW: lambda a, b: a**b, ca.OP_FABS: ca.fabs,
-        ca.OP_SIGN: ca.sign, ca.OP_TAN: ca.tan, ca.OP_TANH: ca.tanh, ca.OP_FMIN: ca.fmin, ca.OP_FMAX: ca.fmax,
+    table: dict[int, Callable[..., ca.SX]] = {
+        ca.OP_DIV: lambda a, b: a / b,
+        ca.OP_INV: lambda a: 1 / a,
+        ca.OP_SQRT: ca.sqrt,
+        ca.OP_EXP: ca.exp,
+        ca.OP_LOG: ca.log,
+        ca.OP_POW: lambda a, b: a**b,
+        ca.OP_CONSTPOW: lambda a, b: a**b,
+        ca.OP_FABS: ca.fabs,
+        ca.OP_SIGN: ca.sign,
+        ca.OP_TAN: ca.tan,
+        ca.OP_TANH: ca.tanh,
+        ca.OP_FMIN: ca.fmin,
+        ca.OP_FMAX: ca.fmax,
     }
     if op not in table:
         names = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
-        raise ValueError(f"an energy may not contain the operation {names.get(op, op)}; write it with +, -, *, /, "
-                         "powers, sqrt, exp, log, sin, cos, tan, tanh, fabs, sign, fmin or fmax")
+        raise ValueError(
+            f"an energy may not contain the operation {names.get(op, op)}; write it with +, -, *, /, "
+            "powers, sqrt, exp, log, sin, cos, tan, tanh, fabs, sign, fmin or fmax"
+        )
     return table[op](*arguments)
+
+
+def _by_degree(monomial: Monomial) -> tuple[int, Monomial]:
+    return sum(power for _, power in monomial), monomial
 
 
 def _emit(polynomial: Polynomial, atoms: _Atoms, levels: Sequence[frozenset[int]]) -> ca.SX:
     """Write a polynomial; terms that share their factors among the atoms of `levels[0]` are put together first."""
-    if not polynomial:
-        return ca.SX(0)
     if not levels:
-        total: ca.SX | None = None
-        for monomial in sorted(polynomial, key=lambda m: (sum(k for _, k in m), m)):
+        total = ca.SX(0)
+        for monomial in sorted(polynomial, key=_by_degree):
             coefficient = polynomial[monomial]
-            term = _product(monomial, atoms)
-            magnitude = abs(coefficient)
-            factor = term if magnitude == 1.0 and monomial else magnitude * term
-            if total is None:
-                total = factor if coefficient > 0 else -factor
-            else:
-                total = total + factor if coefficient > 0 else total - factor
+            term = abs(coefficient) * _product(monomial, atoms)
+            total = total + term if coefficient > 0 else total - term
         return total
     groups: dict[Monomial, Polynomial] = {}
     for monomial, coefficient in polynomial.items():
         outer = tuple(item for item in monomial if item[0] in levels[0])
         inner = tuple(item for item in monomial if item[0] not in levels[0])
         groups.setdefault(outer, {})[inner] = coefficient
-    total = None
-    for outer in sorted(groups, key=lambda m: (sum(k for _, k in m), m)):
-        inner_sx = _emit(groups[outer], atoms, levels[1:])
-        term = inner_sx * _product(outer, atoms) if outer else inner_sx
-        total = term if total is None else total + term
+    total = ca.SX(0)
+    for outer in sorted(groups, key=_by_degree):
+        total = total + _emit(groups[outer], atoms, levels[1:]) * _product(outer, atoms)
     return total
 
 

@@ -82,9 +82,11 @@ class Parameter:
 
     @property
     def per_joint(self) -> bool:
+        """Whether there is an entry per joint."""
         return isinstance(self.default, tuple)
 
     def unit_of(self, joint: Joint) -> str:
+        """Unit of a joint's entry."""
         return self.unit.format(q=joint.unit, F=joint.force)
 
 
@@ -153,12 +155,20 @@ class ParameterVector:
             stem = f"{table}_{item.name}"
             if isinstance(item.default, tuple):
                 entries = [
-                    self.scalar(f"{table}.{item.name}.{i}", f"{stem}_{joint.name}", item.unit_of(joint),
-                                default, f"{item.meaning} ({joint.name})", item.bounds)
+                    self.scalar(
+                        f"{table}.{item.name}.{i}",
+                        f"{stem}_{joint.name}",
+                        item.unit_of(joint),
+                        default,
+                        f"{item.meaning} ({joint.name})",
+                        item.bounds,
+                    )
                     for i, (joint, default) in enumerate(zip(joints, item.default, strict=True))
                 ]
                 symbols[item.name] = ca.vertcat(*entries)
             else:
-                symbols[item.name] = self.scalar(f"{table}.{item.name}", stem, item.unit, item.default,
-                                                 item.meaning, item.bounds)
+                unit = " or ".join(dict.fromkeys(item.unit_of(joint) for joint in joints))
+                symbols[item.name] = self.scalar(
+                    f"{table}.{item.name}", stem, unit, item.default, item.meaning, item.bounds
+                )
         return Values(symbols)

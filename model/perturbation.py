@@ -28,8 +28,9 @@ def quasi_steady_force(u_slow: ca.SX, disturbance: ca.SX, link: EquationsOfMotio
     return solve_spd(compliance, load)
 
 
-def fast_dynamics(eta: ca.SX, u_fast: ca.SX, mass: ca.SX, motor_inertia: ca.SX, stiffness: ca.SX,
-                  epsilon: ca.SX) -> ca.SX:
+def fast_dynamics(
+    eta: ca.SX, u_fast: ca.SX, mass: ca.SX, motor_inertia: ca.SX, stiffness: ca.SX, epsilon: ca.SX
+) -> ca.SX:
     """d^2 eta / d tau^2 = K1 (M2^-1 U_f - (M2^-1 + M1^-1) eta), n x 1                                    (11)."""
     k1 = epsilon**2 * stiffness
     return k1 * (over(u_fast - eta, motor_inertia) - solve_spd(mass, eta))

@@ -12,12 +12,22 @@ from typing import Literal, Protocol
 import casadi as ca
 
 from springline.model.linear import over
-from springline.model.parameters import EVEN, LIMIT, NON_NEGATIVE, POSITIVE, UNIT_OPEN, Bounds, Parameter, Values
+from springline.model.parameters import (
+    EVEN,
+    LIMIT,
+    NON_NEGATIVE,
+    POSITIVE,
+    UNIT_OPEN,
+    Bounds,
+    Parameter,
+    Values,
+)
 
 LogForm = Literal["power", "base"]
 
-# Guards arguments of roots and logarithms at zero: far below any signal, and h**(-4/3) of it is still finite.
-TINY = 1e-200
+# Guards arguments of roots and logarithms at zero: far below any signal, and h**(-5/2) of it, the steepest power
+# in the derivatives of the surface's slope, is still finite.
+TINY = 1e-120
 # exp of this is 1e304: a reaching law that asks for more is clipped by a_max or reported as divergence.
 LARGEST_EXPONENT = 700.0
 
@@ -32,8 +42,7 @@ K1 = Parameter("k1", "SI", 3.0, "gain of the reaching law's first term", POSITIV
 K2 = Parameter("k2", "SI", 5.0, "gain of the reaching law's second term", POSITIVE)
 K3 = Parameter("k3", "SI", 12.0, "gain of the reaching law's third term", POSITIVE)
 ALPHA = Parameter("alpha", "1", 0.5, "exponent of the reaching law", UNIT_OPEN)
-BETA = Parameter("beta", "1", 5.0, "exponent of the double power law's second term",
-                 Bounds(low=1.0, low_open=True))
+BETA = Parameter("beta", "1", 5.0, "exponent of the double power law's second term", Bounds(low=1.0, low_open=True))
 EPSILON_LOG = Parameter("epsilon_log", "SI", 10.0, "factor inside the logarithm", POSITIVE)
 NU = Parameter("nu", "1", 2.0, "even power inside the logarithm", EVEN)
 ZETA = Parameter("zeta", "1", 0.9, "exponent of the variable power", UNIT_OPEN)
@@ -57,7 +66,7 @@ def odd_power(e: ca.SX, exponent: Fraction) -> tuple[ca.SX, ca.SX]:
         for _ in range(rest.numerator // 2):
             growth = growth * e**2
     else:
-        growth = ca.fabs(e) ** float(rest)
+        growth = ca.fmax(ca.fabs(e), TINY) ** float(rest)
     return e * growth, float(exponent) * growth
 
 
@@ -100,11 +109,20 @@ def surface(e: ca.SX, de: ca.SX, p: Values, exponents: SurfaceExponents) -> tupl
 class ReachingLaw(Protocol):
     """A reaching law: rate(sigma, p, log_form) is the wished d sigma / dt, for a scalar sigma."""
 
-    name: str
-    title: str
-    parameters: tuple[Parameter, ...]
+    @property
+    def name(self) -> str:
+        """Name in scenario files and of the generated function."""
 
-    def rate(self, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX: ...
+    @property
+    def title(self) -> str:
+        """Name for people."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """What it reads from the [control] table."""
+
+    def rate(self, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX:
+        """Wished d sigma / dt of a scalar sigma, without the limit a_max."""
 
 
 class VariablePowerLog:
@@ -115,6 +133,7 @@ class VariablePowerLog:
     parameters = (K1, K2, K3, ALPHA, EPSILON_LOG, NU, ZETA)
 
     def rate(self, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX:
+        """Wished d sigma / dt of a scalar sigma."""
         size = ca.fmax(ca.fabs(sigma), TINY)
         exponent = p.zeta * ca.fmax(size, 1.0) * ca.log(size)
         power = ca.exp(ca.fmin(exponent, LARGEST_EXPONENT))
@@ -134,6 +153,7 @@ class DoublePower:
     parameters = (K1, K2, ALPHA, BETA)
 
     def rate(self, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX:
+        """Wished d sigma / dt of a scalar sigma."""
         size = ca.fmax(ca.fabs(sigma), TINY)
         return -(p.k1 * size**p.alpha + p.k2 * size**p.beta) * ca.sign(sigma)
 
@@ -146,6 +166,7 @@ class Power:
     parameters = (K1, ALPHA)
 
     def rate(self, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX:
+        """Wished d sigma / dt of a scalar sigma."""
         size = ca.fmax(ca.fabs(sigma), TINY)
         return -(p.k1 * size**p.alpha) * ca.sign(sigma)
 

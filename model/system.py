@@ -31,9 +31,9 @@ MotorStart = Literal["unloaded", "equilibrium", "given"]
 
 @dataclass(frozen=True, slots=True)
 class SignalShape:
-    """The shape of a vector signal: its kind, and per coordinate the number of sine terms or whether it has a column.
+    """The shape of a vector signal: its kind, and per coordinate the number of sine terms or if it has a column.
 
-    sine: terms[i] is the number of terms of coordinate i. table: terms[i] is 1 with a column, 0 (constant zero) without.
+    sine: terms[i] is the number of terms of coordinate i. table: terms[i] is 1 with a column, 0 (zero) without.
     """
 
     kind: SignalKind = "none"
@@ -97,17 +97,30 @@ class System:
         self.t = ca.SX.sym("t")
         self._d: list[ca.SX] = []
         self.tables: tuple[TableLayout, ...] = ()
-        reference = self._signals("reference", self.structure.reference, [(j.name, j.unit) for j in self.joints], vector)
+        reference = self._signals(
+            "reference", self.structure.reference, [(j.name, j.unit) for j in self.joints], vector
+        )
         base = self._signals("base_motion", self.structure.base_motion, [(c.key, c.unit) for c in COORDINATES], vector)
         self._signal_expressions = ca.vertcat(*signals.stack(reference), *signals.stack(base))
         self._initial = {
-            name: ca.vertcat(*(
-                vector.scalar(f"initial.{name}.{i}", f"initial_{name}_{joint.name}", unit.format(joint.unit), 0.0,
-                              f"{meaning} ({joint.name})", REAL)
-                for i, joint in enumerate(self.joints)))
+            name: ca.vertcat(
+                *(
+                    vector.scalar(
+                        f"initial.{name}.{i}",
+                        f"initial_{name}_{joint.name}",
+                        unit.format(joint.unit),
+                        0.0,
+                        f"{meaning} ({joint.name})",
+                        REAL,
+                    )
+                    for i, joint in enumerate(self.joints)
+                )
+            )
             for name, unit, meaning in (
-                ("q", "{}", "initial joint coordinate"), ("dq", "{}/s", "initial joint rate"),
-                ("q_motor", "{}", "initial motor coordinate, where it is given"))
+                ("q", "{}", "initial joint coordinate"),
+                ("dq", "{}/s", "initial joint rate"),
+                ("q_motor", "{}", "initial motor coordinate, where it is given"),
+            )
         }
         self.d = ca.vertcat(*self._d)
         self.p = vector.sx
@@ -120,8 +133,13 @@ class System:
         self.x = ca.vertcat(self.q1, self.dq1, self.q2, self.dq2)
         self.u = ca.SX.sym("u", n)
 
-    def _signals(self, table: Literal["reference", "base_motion"], shape: SignalShape,
-                 coordinates: list[tuple[str, str]], vector: ParameterVector) -> list[Signal]:
+    def _signals(
+        self,
+        table: Literal["reference", "base_motion"],
+        shape: SignalShape,
+        coordinates: list[tuple[str, str]],
+        vector: ParameterVector,
+    ) -> list[Signal]:
         """Expressions of one vector signal; appends its parameters to `vector` or its data to d."""
         if shape.kind == "none":
             return [CONSTANT_ZERO] * len(coordinates)
@@ -138,12 +156,34 @@ class System:
             offset = ca.SX(0)
             dotted = f"{table}.{key}"
             if table == "reference":
-                offset = vector.scalar(f"{dotted}.offset", f"{table}_{key}_offset", unit, 0.0, f"offset of the {key} reference")
+                offset = vector.scalar(
+                    f"{dotted}.offset", f"{table}_{key}_offset", unit, 0.0, f"offset of the {key} reference"
+                )
                 dotted += ".terms"
             terms = [
-                (vector.scalar(f"{dotted}.{k}.amplitude", f"{table}_{key}_{k}_amplitude", unit, 0.0, f"amplitude of {key} term {k}"),
-                 vector.scalar(f"{dotted}.{k}.omega", f"{table}_{key}_{k}_omega", "rad/s", 0.0, f"angular frequency of {key} term {k}"),
-                 vector.scalar(f"{dotted}.{k}.phase", f"{table}_{key}_{k}_phase", "rad", 0.0, f"phase of {key} term {k}"))
+                (
+                    vector.scalar(
+                        f"{dotted}.{k}.amplitude",
+                        f"{table}_{key}_{k}_amplitude",
+                        unit,
+                        0.0,
+                        f"amplitude of {key} term {k}",
+                    ),
+                    vector.scalar(
+                        f"{dotted}.{k}.omega",
+                        f"{table}_{key}_{k}_omega",
+                        "rad/s",
+                        0.0,
+                        f"angular frequency of {key} term {k}",
+                    ),
+                    vector.scalar(
+                        f"{dotted}.{k}.phase",
+                        f"{table}_{key}_{k}_phase",
+                        "rad",
+                        0.0,
+                        f"phase of {key} term {k}",
+                    ),
+                )
                 for k in range(count)
             ]
             result.append(signals.sine_sum(self.t, offset, terms))
@@ -161,16 +201,27 @@ class System:
         m2, stiffness = (self._column(c, self._plant) for c in (self.mechanism.motor_inertia, self.mechanism.stiffness))
         m2_nominal = self._column(self.mechanism.motor_inertia, self._nominal)
         law = LAWS[self.structure.law]
-        signals_of_control = control((self.q1d, self.dq1d, self.ddq1d), x, nominal, m2_nominal, self._control, law,
-                                     self.structure.log_form, self.structure.exponents)
-        u_slow, u_fast, eta, sigma = (ca.SX.sym(name, n) for name, n in
-                                      (("u_s", self.n), ("u_f", self.n), ("eta", self.n), ("sigma", 1)))
+        signals_of_control = control(
+            (self.q1d, self.dq1d, self.ddq1d),
+            x,
+            nominal,
+            m2_nominal,
+            self._control,
+            law,
+            self.structure.log_form,
+            self.structure.exponents,
+        )
+        u_slow, u_fast, eta, sigma = (
+            ca.SX.sym(name, n) for name, n in (("u_s", self.n), ("u_f", self.n), ("eta", self.n), ("sigma", 1))
+        )
         ref_in, ref_names = [self.q1d, self.dq1d, self.ddq1d], ["q1d", "dq1d", "ddq1d"]
         base_in, base_names = [base.b, base.db, base.ddb], ["b", "db", "ddb"]
         dx = plant(x, u, real, m2, stiffness)
         s = signals_of_control
 
-        def function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], names_in: list[str], names_out: list[str]) -> ca.Function:
+        def function(
+            name: str, inputs: list[ca.SX], outputs: list[ca.SX], names_in: list[str], names_out: list[str]
+        ) -> ca.Function:
             with as_written():
                 flat = ca.cse([ca.densify(o) for o in outputs])
                 return ca.Function(name, [*inputs, p], flat, [*names_in, "p"], names_out)
@@ -178,7 +229,9 @@ class System:
         start_motor = {
             "unloaded": lambda: self._initial["q"],
             "given": lambda: self._initial["q_motor"],
-            "equilibrium": lambda: ca.substitute(static_motor_position(q1, real.gravity, stiffness), q1, self._initial["q"]),
+            "equilibrium": lambda: ca.substitute(
+                static_motor_position(q1, real.gravity, stiffness), q1, self._initial["q"]
+            ),
         }[self.structure.initial_motor]()
         slow_args, slow_names = [*base_in, q1, dq1, u_slow], [*base_names, "q1", "dq1", "u_s"]
         built = [
@@ -187,23 +240,68 @@ class System:
             function("gravity", [q1], [real.gravity], ["q1"], ["G"]),
             function("base_disturbance", [*base_in, q1, dq1], [real.disturbance], [*base_names, "q1", "dq1"], ["S"]),
             function("plant", [*base_in, x, u], [dx], [*base_names, "x", "u"], ["dx"]),
-            function("slow_dynamics", slow_args,
-                     [perturbation.slow_dynamics(u_slow, real.disturbance, real, m2)], slow_names, ["ddq1"]),
-            function("quasi_steady_force", slow_args,
-                     [perturbation.quasi_steady_force(u_slow, real.disturbance, real, m2)], slow_names, ["z_bar"]),
-            function("fast_dynamics", [q1, eta, u_fast],
-                     [perturbation.fast_dynamics(eta, u_fast, real.mass, m2, stiffness, self._nominal.epsilon)],
-                     ["q1", "eta", "u_f"], ["ddeta"]),
-            function("slow_control", [*ref_in, x], [s.slow, s.error, s.sigma], [*ref_names, "x"], ["u_s", "e", "sigma"]),
-            function("fast_control", [dq1, self.dq2], [fast_control(dq1, self.dq2, self._control.K_f)], ["dq1", "dq2"], ["u_f"]),
-            function("control", [*ref_in, x], [s.command, s.slow, s.fast, s.error, s.sigma], [*ref_names, "x"],
-                     ["u", "u_s", "u_f", "e", "sigma"]),
-            *(function(f"law_{each.name}", [sigma], [each.rate(sigma, self._control, self.structure.log_form)], ["sigma"], ["dsigma"])
-              for each in LAWS.values()),
+            function(
+                "slow_dynamics",
+                slow_args,
+                [perturbation.slow_dynamics(u_slow, real.disturbance, real, m2)],
+                slow_names,
+                ["ddq1"],
+            ),
+            function(
+                "quasi_steady_force",
+                slow_args,
+                [perturbation.quasi_steady_force(u_slow, real.disturbance, real, m2)],
+                slow_names,
+                ["z_bar"],
+            ),
+            function(
+                "fast_dynamics",
+                [q1, eta, u_fast],
+                [perturbation.fast_dynamics(eta, u_fast, real.mass, m2, stiffness, self._nominal.epsilon)],
+                ["q1", "eta", "u_f"],
+                ["ddeta"],
+            ),
+            function(
+                "slow_control",
+                [*ref_in, x],
+                [s.slow, s.error, s.sigma],
+                [*ref_names, "x"],
+                ["u_s", "e", "sigma"],
+            ),
+            function(
+                "fast_control",
+                [dq1, self.dq2],
+                [fast_control(dq1, self.dq2, self._control.K_f)],
+                ["dq1", "dq2"],
+                ["u_f"],
+            ),
+            function(
+                "control",
+                [*ref_in, x],
+                [s.command, s.slow, s.fast, s.error, s.sigma],
+                [*ref_names, "x"],
+                ["u", "u_s", "u_f", "e", "sigma"],
+            ),
+            *(
+                function(
+                    f"law_{each.name}",
+                    [sigma],
+                    [each.rate(sigma, self._control, self.structure.log_form)],
+                    ["sigma"],
+                    ["dsigma"],
+                )
+                for each in LAWS.values()
+            ),
             function("energy", [x], [self._energy(m2, stiffness)], ["x"], ["energy"]),
             function("slow_mass", [q1], [perturbation.slow_mass(real.mass, m2)], ["q1"], ["H"]),
             function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
-            function("start", [], [ca.vertcat(self._initial["q"], self._initial["dq"], start_motor, ca.SX.zeros(self.n))], [], ["x"]),
+            function(
+                "start",
+                [],
+                [ca.vertcat(self._initial["q"], self._initial["dq"], start_motor, ca.SX.zeros(self.n))],
+                [],
+                ["x"],
+            ),
             function("loop_control", [w, x], [s.command, s.error, s.sigma], ["w", "x"], ["u", "e", "sigma"]),
             function("loop_error", [w, x], [s.error, s.sigma], ["w", "x"], ["e", "sigma"]),
             function("loop_plant", [w, x, u], [dx], ["w", "x", "u"], ["dx"]),

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from os import cpu_count
 from threading import Thread
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from springline.codegen.kernel import METRICS, STATUS, Control, Engine, Kernel, KernelOptions, LoopSettings, Runs, Table, kernel
+from springline.codegen.kernel import (
+    METRICS,
+    STATUS,
+    Control,
+    Engine,
+    Kernel,
+    KernelOptions,
+    LoopSettings,
+    Runs,
+    Table,
+    kernel,
+)
 from springline.model.base import COORDINATES
 from springline.model.parameters import Joint
 from springline.model.system import System
@@ -23,8 +32,15 @@ Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 _METRIC_UNITS = {
-    "response_time": "s", "settling_time": "s", "overshoot": "{q}", "steady_state_error": "{q}", "iae": "{q} s",
-    "U_max": "{F}", "U_tv": "{F}", "sigma_tv": "{q}/s", "dq1_tv": "{q}/s",
+    "response_time": "s",
+    "settling_time": "s",
+    "overshoot": "{q}",
+    "steady_state_error": "{q}",
+    "iae": "{q} s",
+    "U_max": "{F}",
+    "U_tv": "{F}",
+    "sigma_tv": "{q}/s",
+    "dq1_tv": "{q}/s",
 }
 
 
@@ -51,20 +67,33 @@ def field(name: str, unit: str, kind: pa.DataType | None = None) -> pa.Field:
 
 def trajectory_schema(system: System) -> pa.Schema:
     """Columns of a trajectory, in the order of the loop's rows."""
+
     def per_joint(quantity: str, suffix: str = "", force: bool = False) -> list[pa.Field]:
         return [field(f"{quantity}_{j.name}", (j.force if force else j.unit) + suffix) for j in system.joints]
 
-    return pa.schema([
-        field("t", "s"), *per_joint("q1"), *per_joint("dq1", "/s"), *per_joint("q2"), *per_joint("dq2", "/s"),
-        *per_joint("q1d"), *per_joint("e"), *per_joint("sigma", "/s"), *per_joint("U", force=True),
-        *(field(c.symbol, c.unit) for c in COORDINATES),
-    ])
+    return pa.schema(
+        [
+            field("t", "s"),
+            *per_joint("q1"),
+            *per_joint("dq1", "/s"),
+            *per_joint("q2"),
+            *per_joint("dq2", "/s"),
+            *per_joint("q1d"),
+            *per_joint("e"),
+            *per_joint("sigma", "/s"),
+            *per_joint("U", force=True),
+            *(field(c.symbol, c.unit) for c in COORDINATES),
+        ]
+    )
 
 
 def metrics_schema(joints: Sequence[Joint]) -> pa.Schema:
     """Columns of a table of metrics, metric by metric, then status and t_end."""
-    units = [field(f"{metric}_{j.name}", _METRIC_UNITS[metric].format(q=j.unit, F=j.force))
-             for metric in METRICS for j in joints]
+    units = [
+        field(f"{metric}_{j.name}", _METRIC_UNITS[metric].format(q=j.unit, F=j.force))
+        for metric in METRICS
+        for j in joints
+    ]
     return pa.schema([*units, field("status", "", pa.string()), field("t_end", "s")])
 
 
@@ -82,9 +111,14 @@ def metrics_table(joints: Sequence[Joint], runs: Runs) -> pa.Table:
 def loop_settings(scenario: Scenario, *, trajectory: bool) -> LoopSettings:
     """What the loop is told about the scenario."""
     return LoopSettings(
-        steps=scenario.steps, step=scenario.step, bound=scenario.bound, hold=max(scenario.control_every, 1),
+        steps=scenario.steps,
+        step=scenario.step,
+        bound=scenario.bound,
+        hold=max(scenario.control_every, 1),
         output_every=scenario.output_every if trajectory else 0,
-        response_band=scenario.response_band, settling_band=scenario.settling_band)
+        response_band=scenario.response_band,
+        settling_band=scenario.settling_band,
+    )
 
 
 def kernel_tables(tables: Sequence[SignalTable]) -> list[Table]:
@@ -114,7 +148,10 @@ def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tup
         return status, f"done: {end:g} s in {settings.steps} steps"
     quantity = state_name(system, int(runs.quantity[run]))
     left = "the finite numbers" if status == "diverged" else f"its bound (|{quantity}| <= {settings.bound:g})"
-    return status, f"{status}: {quantity} left {left} at t = {end + settings.step:g} s; results end at t = {end:g} s"
+    return (
+        status,
+        f"{status}: {quantity} left {left} at t = {end + settings.step:g} s; results end at t = {end:g} s",
+    )
 
 
 def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress | None = None) -> Result:
@@ -136,8 +173,9 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     return Result(trajectory, metrics_table(system.joints, runs), status, message)
 
 
-def _watched(loop: Kernel, values: Floats, settings: LoopSettings, tables: Sequence[Table],
-             progress: Progress | None) -> Runs:
+def _watched(
+    loop: Kernel, values: Floats, settings: LoopSettings, tables: Sequence[Table], progress: Progress | None
+) -> Runs:
     """Run in a thread of its own, so that Ctrl-C and a progress bar reach a long run."""
     control = Control()
     done: list[Runs] = []
@@ -164,42 +202,3 @@ def _watched(loop: Kernel, values: Floats, settings: LoopSettings, tables: Seque
     if failed:
         raise failed[0]
     return done[0]
-
-
-def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | None = None) -> pa.Table:
-    """Simulate one run per entry of the arrays in `columns`, all threads at work, without trajectories.
-
-    columns  dotted key -> values, all of one length; every other number is the scenario's and becomes a constant of
-             the kernel (compiled on first use, then cached)
-    jobs     threads, None for one per processor
-    Returns a table with one row a run: run, the varied keys, every metric, status, t_end. It does not depend on `jobs`.
-    Raises InputError for an unknown key or a value out of bounds, ValueError for arrays of different lengths.
-    """
-    arrays = {key: np.atleast_1d(np.asarray(values, dtype=np.float64)) for key, values in columns.items()}
-    lengths = {key: len(values) for key, values in arrays.items()}
-    if not lengths or len(set(lengths.values())) != 1:
-        raise ValueError(f"the columns of a batch must be non-empty arrays of one length, got {lengths}")
-    values = scenario.values_for(arrays)
-    slots = scenario.system().slots
-    tunable = tuple(slot.key for i, slot in enumerate(slots) if np.any(values[:, i] != values[0, i]))
-    loop = kernel(scenario.structure(), scenario.control_every > 0, KernelOptions(tunable=tunable),
-                  tuple(float(v) for v in values[0]))
-    chosen = [i for i, slot in enumerate(slots) if slot.key in set(loop.parameters)]
-    runs = run_threads(loop, values[:, chosen], loop_settings(scenario, trajectory=False),
-                       kernel_tables(scenario.tables()), jobs or cpu_count() or 1)
-    result = metrics_table(scenario.system().joints, runs)
-    units = {key: number.unit for key, number in scenario.numeric_keys().items()}
-    for position, (key, array) in enumerate(arrays.items()):
-        result = result.add_column(position, field(key, units[key]), pa.array(array))
-    return result.add_column(0, field("run", "", pa.int64()), pa.array(np.arange(values.shape[0])))
-
-
-def run_threads(loop: Kernel, parameters: Floats, settings: LoopSettings, tables: Sequence[Table], jobs: int) -> Runs:
-    """Kernel.run over whole packs in `jobs` threads; the loop releases the GIL, and threads share nothing."""
-    packs = -(-parameters.shape[0] // loop.width)
-    jobs = max(1, min(jobs, packs))
-    edges = [loop.width * (packs * i // jobs) for i in range(jobs)] + [parameters.shape[0]]
-    with ThreadPoolExecutor(jobs) as pool:
-        parts = list(pool.map(lambda i: loop.run(parameters[edges[i]:edges[i + 1]], settings, tables), range(jobs)))
-    return Runs(*(np.concatenate([getattr(part, name) for part in parts])
-                  for name in ("metrics", "final_state", "end_time", "status", "quantity")))

@@ -9,6 +9,7 @@
 
 #ifdef SL_HOST_LIBM
 #include <math.h>
+#define SL_INF HUGE_VAL
 #else
 #include "sl_math.h"
 #define sin sl_sin

@@ -39,6 +39,7 @@ typedef int sl_m;
 #define slv_any sl_any
 #define slv_all sl_all
 #define slv_pick sl_pick
+#define slv_below sl_below
 #define slv_fmin sl_fmin
 #define slv_fmax sl_fmax
 #define slv_sqrt sl_sqrt
@@ -142,6 +143,11 @@ static inline sl_v slv_pick(sl_b at, sl_v a, sl_v b) {
 static inline sl_v slv_pick(sl_b at, sl_v a, sl_v b) { return slv_select((sl_m)at < 0, b, a); }
 #endif
 
+/* a < limit, unsigned; with the top bits turned it is a signed comparison, which AVX2 has */
+static inline sl_m slv_below(sl_b a, uint64_t limit) {
+  return (sl_m)(a + SL_SIGN_BIT) < (sl_m)((sl_b){0} + (limit + SL_SIGN_BIT));
+}
+
 #ifdef SL_NATIVE_TOPS
 static inline int slv_any(sl_m m) {
   sl_parts p;
@@ -223,62 +229,92 @@ static inline sl_v slv_put(sl_v x, int lane, double value) {
   return x;
 }
 
-/* Rare lanes leave the fast path through these: out of line and through memory, so that the fast path keeps its registers. */
+/*
+ * slv_name(x): complete.  Rare lanes leave the fast path through a branch, out of line and through memory, so that
+ * the fast path keeps its registers.
+ */
 #define SL_F sl_v
 #define SL_B sl_b
 #define SL_M sl_m
 #define SL_FN(name) slv_##name
-#define SL_LISTED_INLINE static __attribute__((noinline, unused))
-#define SL_DEFINE_PATCH1(name)                                               \
-  SL_RARE void slv_##name(sl_v *r, const sl_v *x, const sl_m *ok) {          \
-    for (int lane = 0; lane < SL_W; lane++)                                  \
+#define SL_CHECKED(name) slv_##name
+#define SL_OK
+#define SL_PASS_OK
+#define SL_CORES
+#define SL_POW_INLINE static __attribute__((noinline, unused))
+#define SL_DEFINE_PATCH1(name)                                                   \
+  SL_RARE void slv_##name(sl_v *r, const sl_v *x, const sl_m *ok) {              \
+    for (int lane = 0; lane < SL_W; lane++)                                      \
       if (!SL_LANE(*ok, lane)) SL_LANE(*r, lane) = sl_##name(SL_LANE(*x, lane)); \
   }
-#define SL_DEFINE_PATCH2(name)                                                              \
-  SL_RARE void slv_##name(sl_v *r, const sl_v *x, const sl_v *y, const sl_m *ok) {          \
-    for (int lane = 0; lane < SL_W; lane++)                                                 \
+#define SL_DEFINE_PATCH2(name)                                                                      \
+  SL_RARE void slv_##name(sl_v *r, const sl_v *x, const sl_v *y, const sl_m *ok) {                  \
+    for (int lane = 0; lane < SL_W; lane++)                                                         \
       if (!SL_LANE(*ok, lane)) SL_LANE(*r, lane) = sl_##name(SL_LANE(*x, lane), SL_LANE(*y, lane)); \
   }
-#define SL_PATCH1(ok, r, name, x)             \
-  do {                                        \
-    sl_m ok_ = (ok);                          \
-    if (!SL_LIKELY(slv_all(ok_))) {           \
-      sl_v r_ = (r), x_ = (x);                \
-      slv_##name(&r_, &x_, &ok_);             \
-      (r) = r_;                               \
-    }                                         \
+#define SL_PATCH1(ok, r, name, x)           \
+  do {                                      \
+    const sl_m ok_ = (ok);                  \
+    if (!SL_LIKELY(slv_all(ok_))) {         \
+      sl_v r_ = (r), x_ = (x);              \
+      sl_m m_ = ok_;                        \
+      slv_##name(&r_, &x_, &m_);            \
+      (r) = r_;                             \
+    }                                       \
   } while (0)
-#define SL_PATCH2(ok, r, name, x, y)          \
-  do {                                        \
-    sl_m ok_ = (ok);                          \
-    if (!SL_LIKELY(slv_all(ok_))) {           \
-      sl_v r_ = (r), x_ = (x), y_ = (y);      \
-      slv_##name(&r_, &x_, &y_, &ok_);        \
-      (r) = r_;                               \
-    }                                         \
+#define SL_PATCH2(ok, r, name, x, y)        \
+  do {                                      \
+    const sl_m ok_ = (ok);                  \
+    if (!SL_LIKELY(slv_all(ok_))) {         \
+      sl_v r_ = (r), x_ = (x), y_ = (y);    \
+      sl_m m_ = ok_;                        \
+      slv_##name(&r_, &x_, &y_, &m_);       \
+      (r) = r_;                             \
+    }                                       \
   } while (0)
-#define SL_PATCH_REDUCE(ok, x, hi, lo, q)              \
-  do {                                                 \
-    sl_m ok_ = (ok);                                   \
-    if (!SL_LIKELY(slv_all(ok_))) {                    \
-      sl_v x_ = (x), hi_ = *(hi), lo_ = *(lo);         \
-      sl_b q_ = (q);                                   \
-      slv_reduce_rare(&x_, &hi_, &lo_, &q_, &ok_);     \
-      *(hi) = hi_;                                     \
-      *(lo) = lo_;                                     \
-      (q) = q_;                                        \
-    }                                                  \
+#define SL_PATCH_REDUCE(ok, x, hi, lo, n)            \
+  do {                                               \
+    const sl_m ok_ = (ok);                           \
+    if (!SL_LIKELY(slv_all(ok_))) {                  \
+      sl_v x_ = (x), hi_ = *(hi), lo_ = *(lo);       \
+      sl_b n_ = (n);                                 \
+      sl_m m_ = ok_;                                 \
+      slv_reduce_rare(&x_, &hi_, &lo_, &n_, &m_);    \
+      *(hi) = hi_;                                   \
+      *(lo) = lo_;                                   \
+      (n) = n_;                                      \
+    }                                                \
   } while (0)
 
-SL_RARE void slv_reduce_rare(const sl_v *x, sl_v *hi, sl_v *lo, sl_b *q, const sl_m *ok) {
+SL_RARE void slv_reduce_rare(const sl_v *x, sl_v *hi, sl_v *lo, sl_b *n, const sl_m *ok) {
   for (int lane = 0; lane < SL_W; lane++) {
     double h, l;
     if (SL_LANE(*ok, lane)) continue;
-    SL_LANE(*q, lane) = sl_reduce_rare(SL_LANE(*x, lane), &h, &l);
+    SL_LANE(*n, lane) = sl_reduce_rare(SL_LANE(*x, lane), &h, &l);
     SL_LANE(*hi, lane) = h;
     SL_LANE(*lo, lane) = l;
   }
 }
+
+#include "sl_math.h"
+
+/*
+ * slv_name_fast(x, &ok): the same without any branch, so that a whole evaluation is one block for the compiler to
+ * schedule.  Lanes that slv_name(x) would have patched are cleared in ok, their result is meaningless: start with
+ * ok = slv_yes() and, unless slv_all(ok), evaluate again with slv_name.  Where ok stays set the bits are the same.
+ */
+static inline sl_m slv_yes(void) { return slv_set(0.0) == 0.0; }
+
+#define SL_F sl_v
+#define SL_B sl_b
+#define SL_M sl_m
+#define SL_FN(name) slv_##name
+#define SL_CHECKED(name) slv_##name##_fast
+#define SL_OK , sl_m *ok
+#define SL_PASS_OK , ok
+#define SL_PATCH1(fine, r, name, x) (*ok &= (fine))
+#define SL_PATCH2(fine, r, name, x, y) (*ok &= (fine))
+#define SL_PATCH_REDUCE(fine, x, hi, lo, n) (*ok &= (fine))
 
 #include "sl_math.h"
 

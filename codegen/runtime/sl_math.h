@@ -9,10 +9,10 @@
  * Errors are below 2 ulp over the whole double range (docs/math.md has the measured table); special values
  * are those of C99 Annex F.  Not reproducible: the sign and payload of a NaN.  Not supported: flush-to-zero.
  *
- * How to read this file.  Part 1 are the scalar primitives.  Part 2 are the kernels, written once in terms
- * of SL_F (real), SL_B (its bits), SL_M (mask) and SL_FN(name).  Here they become sl_name() on double;
- * sl_lanes.h includes part 2 again and makes slv_name() on vectors of W doubles.  A kernel computes the common
- * case without branches; SL_PATCH then replaces the lanes outside it by a scalar sl_name_rare().
+ * How to read this file.  Part 1 are the scalar primitives.  Part 2 are the kernels, written once in terms of
+ * SL_F (real), SL_B (its bits), SL_M (mask) and SL_FN(name).  Here they become sl_name() on double; sl_lanes.h
+ * includes part 2 again and makes slv_name() on vectors of W doubles.  A kernel computes the common case
+ * without branches; SL_PATCH then replaces the lanes outside it by a scalar sl_name_rare().
  */
 #ifndef SL_MATH_H
 #define SL_MATH_H
@@ -32,9 +32,11 @@
 
 #if defined(__GNUC__)
 #define SL_LIKELY(c) __builtin_expect((c) != 0, 1)
+#define SL_COLD __attribute__((noinline, cold))
 #define SL_RARE static __attribute__((noinline, cold, unused))
 #else
 #define SL_LIKELY(c) (c)
+#define SL_COLD
 #define SL_RARE static
 #endif
 
@@ -45,7 +47,11 @@
 #define SL_SIGN_BIT UINT64_C(0x8000000000000000)
 #define SL_EXPONENT UINT64_C(0x7ff0000000000000)
 #define SL_HIGH_26 UINT64_C(0xfffffffff8000000) /* keeps 26 significant bits: the square of the rest is exact */
-#define SL_ROUND 0x1.8p52                       /* x + SL_ROUND rounds x to an integer, held in the low bits */
+#define SL_FRACTION UINT64_C(0x000fffffffffffff)
+#define SL_ONE UINT64_C(0x3ff0000000000000)
+#define SL_ROUND 0x1.8p52 /* x + SL_ROUND rounds x to an integer and holds it in the low bits */
+#define SL_LN2_HI 0x1.62e42fefa38p-1 /* 42 bits: exact times an exponent */
+#define SL_LN2_LO 0x1.ef35793c7673p-45
 
 typedef union {
   double real;
@@ -73,6 +79,8 @@ static inline int sl_any(int m) { return m != 0; }
 static inline int sl_all(int m) { return m != 0; }
 /* b if the top bit of `at` is set, else a */
 static inline double sl_pick(uint64_t at, double a, double b) { return (at >> 63) != 0 ? b : a; }
+/* a < limit, unsigned */
+static inline int sl_below(uint64_t a, uint64_t limit) { return a < limit; }
 static inline double sl_fmin(double a, double b) { return a < b ? a : b; }
 static inline double sl_fmax(double a, double b) { return a > b ? a : b; }
 
@@ -151,28 +159,39 @@ static inline int sl_isfinite(double x) { return (sl_bits(x) & SL_EXPONENT) != S
 #define SL_B uint64_t
 #define SL_M int
 #define SL_FN(name) sl_##name
+#define SL_CHECKED(name) sl_##name /* a kernel with rare lanes; sl_lanes.h makes a second kind of those */
+#define SL_OK
+#define SL_PASS_OK
 #define SL_SCALAR
-#define SL_LISTED_INLINE static inline
+#define SL_CORES
+#define SL_POW_INLINE static inline
 #define SL_DEFINE_PATCH1(name)
 #define SL_DEFINE_PATCH2(name)
 /* r = name(x) in the lanes where ok is false */
-#define SL_PATCH1(ok, r, name, x)                       \
-  do {                                                  \
-    if (!SL_LIKELY(ok)) (r) = sl_##name(x);             \
+#define SL_PATCH1(ok, r, name, x)           \
+  do {                                      \
+    if (!SL_LIKELY(ok)) (r) = sl_##name(x); \
   } while (0)
-#define SL_PATCH2(ok, r, name, x, y)                    \
-  do {                                                  \
-    if (!SL_LIKELY(ok)) (r) = sl_##name(x, y);          \
+#define SL_PATCH2(ok, r, name, x, y)           \
+  do {                                         \
+    if (!SL_LIKELY(ok)) (r) = sl_##name(x, y); \
   } while (0)
-#define SL_PATCH_REDUCE(ok, x, hi, lo, q)               \
-  do {                                                  \
-    if (!SL_LIKELY(ok)) (q) = sl_reduce_rare(x, hi, lo); \
+#define SL_PATCH_REDUCE(ok, x, hi, lo, n)                \
+  do {                                                   \
+    if (!SL_LIKELY(ok)) (n) = sl_reduce_rare(x, hi, lo); \
   } while (0)
 #endif /* SL_MATH_H */
 
-/* ---- Part 2: kernels, once per SL_FN -------------------------------------------------------------------- */
+/* ---- Part 2: kernels, once per SL_FN ---------------------------------------------------------------- */
 #ifdef SL_FN
 
+#define SL_EXPONENT_OF(shifted) SL_FN(real)(((shifted) >> 52) ^ UINT64_C(0x4330000000000800)) /* + SL_FIELD_BIAS */
+#define SL_FIELD_BIAS 4503599627372544.0                                                      /* 2^52 + 2048 */
+/* x >= DBL_MIN and finite, from shifted = bits(x) - start */
+#define SL_IS_NORMAL(shifted, start) \
+  SL_FN(below)((shifted) + (start) - UINT64_C(0x0010000000000000), UINT64_C(0x7fe0000000000000))
+
+#ifdef SL_CORES
 static inline SL_F SL_FN(sq)(SL_F x) { return x * x; }
 
 static inline SL_F SL_FN(fabs)(SL_F x) { return SL_FN(real)(SL_FN(bits)(x) & ~SL_SIGN_BIT); }
@@ -188,17 +207,15 @@ static inline SL_F SL_FN(sign)(SL_F x) {
 
 /* x + 2^52 - 2^52 rounds |x| < 2^52 to the nearest integer; one comparison mends the direction. */
 static inline SL_F SL_FN(floor)(SL_F x) {
-  SL_F a = SL_FN(fabs)(x), shift = SL_FN(copysign)(SL_FN(set)(0x1p52), x);
-  SL_F n = (x + shift) - shift;
+  SL_F shift = SL_FN(copysign)(SL_FN(set)(0x1p52), x), n = (x + shift) - shift;
   n = n - SL_FN(if)(n > x, SL_FN(set)(1.0));
-  return SL_FN(select)(a < 0x1p52, SL_FN(copysign)(n, x), x);
+  return SL_FN(select)(SL_FN(fabs)(x) < 0x1p52, SL_FN(copysign)(n, x), x);
 }
 
 static inline SL_F SL_FN(ceil)(SL_F x) {
-  SL_F a = SL_FN(fabs)(x), shift = SL_FN(copysign)(SL_FN(set)(0x1p52), x);
-  SL_F n = (x + shift) - shift;
+  SL_F shift = SL_FN(copysign)(SL_FN(set)(0x1p52), x), n = (x + shift) - shift;
   n = n + SL_FN(if)(n < x, SL_FN(set)(1.0));
-  return SL_FN(select)(a < 0x1p52, SL_FN(copysign)(n, x), x);
+  return SL_FN(select)(SL_FN(fabs)(x) < 0x1p52, SL_FN(copysign)(n, x), x);
 }
 
 #ifdef SL_SCALAR
@@ -213,72 +230,69 @@ SL_RARE double sl_hypot_rare(double x, double y) {
 }
 #endif
 SL_DEFINE_PATCH2(hypot_rare)
+#endif
 
-static inline SL_F SL_FN(hypot)(SL_F x, SL_F y) {
+static inline SL_F SL_CHECKED(hypot)(SL_F x, SL_F y SL_OK) {
   SL_F q = x * x + y * y, r = SL_FN(sqrt)(q);
   SL_PATCH2((q > 0x1p-900) & (q < 0x1p1000), r, hypot_rare, x, y);
   return r;
 }
 
 /* ---- exp, expm1 -----------------------------------------------------------------------------------------
- * hi + lo = k ln 2 + r with |r| <= ln 2 / 2.  exp(r) = 1 + a + b, where a is the exact leading part of r and b
- * holds what is left of r and r^2 P(r), P minimax of degree 9.  On return *t = k + SL_ROUND. */
-static inline void SL_FN(exp_parts)(SL_F hi, SL_F lo, SL_F *t, SL_F *a, SL_F *b) {
-  SL_F n = hi * 0x1.71547652b82fep+0 + SL_ROUND, k = n - SL_ROUND;
-  SL_F rh = hi - k * 0x1.62e42fefa38p-1, rl = lo - k * 0x1.ef35793c7673p-45;
+ * x = k ln 2 + r, |r| <= ln 2 / 2, exp(r) = 1 + r + r^2 P(r) with P minimax of degree 9.  r comes as rh, which is
+ * exact, and rl: adding the small terms to each other first and rh last keeps the error below 1 ulp. */
+#ifdef SL_CORES
+/* rl + r^2 P(r) */
+static inline SL_F SL_FN(exp_tail)(SL_F rh, SL_F rl) {
   SL_F r = rh + rl, r2 = r * r, r4 = r2 * r2;
   SL_F p01 = 0x1.000000000000cp-1 + r * 0x1.5555555555561p-3;
   SL_F p23 = 0x1.555555554ff92p-5 + r * 0x1.111111110d5cep-7;
   SL_F p45 = 0x1.6c16c185cac53p-10 + r * 0x1.a01a01bb06d7ep-13;
   SL_F p67 = 0x1.a0199630e5d3fp-16 + r * 0x1.71dddf79ade3cp-19;
   SL_F p89 = 0x1.28b0a6e418617p-22 + r * 0x1.af860aa738e43p-26;
-  SL_F p = (p01 + r2 * p23) + r4 * ((p45 + r2 * p67) + r4 * p89);
-  *t = n;
-  *a = rh;
-  *b = rl + r2 * p;
+  return rl + r2 * ((p01 + r2 * p23) + r4 * ((p45 + r2 * p67) + r4 * p89));
 }
 
-/* exp(hi + lo) for |hi| < 708, where the exponent can be added to the bits. */
+/* exp(hi + lo) for |hi| < 708, where k can be added to the exponent. */
 static inline SL_F SL_FN(exp_sum)(SL_F hi, SL_F lo) {
-  SL_F t, a, b;
-  SL_FN(exp_parts)(hi, lo, &t, &a, &b);
-  return SL_FN(real)(SL_FN(bits)(1.0 + (a + b)) + (SL_FN(bits)(t) << 52));
+  SL_F t = hi * 0x1.71547652b82fep+0 + SL_ROUND, k = t - SL_ROUND, rh = hi - k * SL_LN2_HI;
+  SL_F m = 1.0 + (rh + SL_FN(exp_tail)(rh, lo - k * SL_LN2_LO));
+  return SL_FN(real)(SL_FN(bits)(m) + (SL_FN(bits)(t) << 52));
 }
 
 #ifdef SL_SCALAR
-/* exp(hi + lo) for every finite hi: overflow, denormal results. */
+/* exp(hi + lo) for every hi but NaN: overflow, denormal results. */
 static inline double sl_exp_sum_rare(double hi, double lo) {
-  double t, a, b;
+  double k, rh;
   if (hi > 710.0) return SL_INF;
   if (hi < -746.0) return 0.0;
-  sl_exp_parts(hi, lo, &t, &a, &b);
-  return sl_scale(1.0 + (a + b), (int)(t - SL_ROUND));
+  k = (hi * 0x1.71547652b82fep+0 + SL_ROUND) - SL_ROUND;
+  rh = hi - k * SL_LN2_HI;
+  return sl_scale(1.0 + (rh + sl_exp_tail(rh, lo - k * SL_LN2_LO)), (int)k);
 }
 
-SL_RARE double sl_exp_rare(double x) {
-  if (x != x) return x;
-  return sl_exp_sum_rare(x, 0.0);
-}
+SL_RARE double sl_exp_rare(double x) { return x != x ? x : sl_exp_sum_rare(x, 0.0); }
 
-SL_RARE double sl_expm1_rare(double x) {
-  if (x != x) return x;
-  return x < 0.0 ? -1.0 : sl_exp_sum_rare(x, 0.0);
-}
+SL_RARE double sl_expm1_rare(double x) { return x != x ? x : x < 0.0 ? -1.0 : sl_exp_sum_rare(x, 0.0); }
 #endif
 SL_DEFINE_PATCH1(exp_rare)
 SL_DEFINE_PATCH1(expm1_rare)
+#endif
 
-static inline SL_F SL_FN(exp)(SL_F x) {
-  SL_F r = SL_FN(exp_sum)(x, SL_FN(set)(0.0));
+static inline SL_F SL_CHECKED(exp)(SL_F x SL_OK) {
+  SL_F t = x * 0x1.71547652b82fep+0 + SL_ROUND, k = t - SL_ROUND, rh = x - k * SL_LN2_HI;
+  SL_F m = 1.0 + (rh + SL_FN(exp_tail)(rh, k * -SL_LN2_LO));
+  SL_F r = SL_FN(real)(SL_FN(bits)(m) + (SL_FN(bits)(t) << 52));
   SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, exp_rare, x);
   return r;
 }
 
-static inline SL_F SL_FN(expm1)(SL_F x) {
-  SL_F t, a, b, s, r;
-  SL_FN(exp_parts)(x, SL_FN(set)(0.0), &t, &a, &b);
-  s = SL_FN(real)((SL_FN(bits)(t) << 52) + UINT64_C(0x3ff0000000000000));
-  r = SL_FN(copysign)(((s - 1.0) + s * a) + s * b, x);
+/* 2^k (1 + r + ...) - 1 with s = 2^k: s - 1 and s rh are added while both are exact or nearly so. */
+static inline SL_F SL_CHECKED(expm1)(SL_F x SL_OK) {
+  SL_F t = x * 0x1.71547652b82fep+0 + SL_ROUND, k = t - SL_ROUND, rh = x - k * SL_LN2_HI;
+  SL_F s = SL_FN(real)((SL_FN(bits)(t) << 52) + SL_ONE);
+  SL_F r = ((s - 1.0) + s * rh) + s * SL_FN(exp_tail)(rh, k * -SL_LN2_LO);
+  r = SL_FN(copysign)(r, x);
   SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, expm1_rare, x);
   return r;
 }
@@ -286,61 +300,64 @@ static inline SL_F SL_FN(expm1)(SL_F x) {
 /* ---- log, log1p -----------------------------------------------------------------------------------------
  * x = 2^k m with m in [sqrt(1/2), sqrt(2)), f = m - 1, s = f / (2 + f), log m = 2 atanh s. */
 #define SL_SQRT_HALF UINT64_C(0x3fe6a09e667f3bcd)
-/* k of the shifted bits: the 12-bit two's complement in the exponent field, as a double */
-#define SL_FIELD(shifted) SL_FN(real)(((shifted) >> 52) ^ UINT64_C(0x4330000000000800))
-#define SL_FIELD_BIAS 4503599627372544.0 /* 2^52 + 2048 */
-
-/* k ln 2 + log(1 + f) + lo */
+#ifdef SL_CORES
+/* k ln2_hi + lo + log(1 + f) */
 static inline SL_F SL_FN(log_sum)(SL_F k, SL_F f, SL_F lo) {
   SL_F s = f / (2.0 + f), z = s * s, w = z * z, half = 0.5 * f * f;
   SL_F p = (0x1.5555555555592p-1 + z * 0x1.999999997fd37p-2) +
            w * ((0x1.24924941f8d20p-2 + z * 0x1.c71c5202b27cdp-3) +
                 w * ((0x1.7466405bfb1c1p-3 + z * 0x1.39a1933386ffcp-3) + w * 0x1.2f0705ae6bc4fp-3));
-  return k * 0x1.62e42fefa38p-1 - ((half - (s * (half + z * p) + (k * 0x1.ef35793c7673p-45 + lo))) - f);
+  return k * SL_LN2_HI - ((half - (s * (half + z * p) + lo)) - f);
 }
 
 #ifdef SL_SCALAR
 SL_RARE double sl_log_rare(double x) {
   uint64_t b, shifted;
+  double k;
   if (x != x || x == SL_INF) return x;
   if (x == 0.0) return -SL_INF;
   if (x < 0.0) return SL_NAN;
   b = sl_bits(x * 0x1p54);
   shifted = b - SL_SQRT_HALF;
-  return sl_log_sum(SL_FIELD(shifted) - (SL_FIELD_BIAS + 54.0), sl_real(b - (shifted & ~UINT64_C(0xfffffffffffff))) - 1.0, 0.0);
+  k = SL_EXPONENT_OF(shifted) - (SL_FIELD_BIAS + 54.0);
+  return sl_log_sum(k, sl_real(b - (shifted & ~SL_FRACTION)) - 1.0, k * SL_LN2_LO);
 }
 #endif
 SL_DEFINE_PATCH1(log_rare)
+#endif
 
-static inline SL_F SL_FN(log)(SL_F x) {
+static inline SL_F SL_CHECKED(log)(SL_F x SL_OK) {
   SL_B b = SL_FN(bits)(x), shifted = b - SL_SQRT_HALF;
-  SL_F f = SL_FN(real)(b - (shifted & ~UINT64_C(0xfffffffffffff))) - 1.0;
-  SL_F r = SL_FN(log_sum)(SL_FIELD(shifted) - SL_FIELD_BIAS, f, SL_FN(set)(0.0));
-  SL_PATCH1((x >= DBL_MIN) & (x <= DBL_MAX), r, log_rare, x);
+  SL_F k = SL_EXPONENT_OF(shifted) - SL_FIELD_BIAS;
+  SL_F r = SL_FN(log_sum)(k, SL_FN(real)(b - (shifted & ~SL_FRACTION)) - 1.0, k * SL_LN2_LO);
+  SL_PATCH1(SL_IS_NORMAL(shifted, SL_SQRT_HALF), r, log_rare, x);
   return r;
 }
 
+#ifdef SL_CORES
 #ifdef SL_SCALAR
-SL_RARE double sl_log1p_rare(double x) {
-  return x > 1.0 ? sl_log(x) : sl_log_rare(1.0 + x);
-}
+/* x <= -1, NaN, or so large (2^1000) that 1 is nothing to it */
+SL_RARE double sl_log1p_rare(double x) { return x > 1.0 ? sl_log(x) : sl_log_rare(1.0 + x); }
 #endif
 SL_DEFINE_PATCH1(log1p_rare)
+#endif
 
-/* 1 + x = u + c exactly; c goes where it still counts: into f, and what f cannot hold to first order behind it. */
-static inline SL_F SL_FN(log1p)(SL_F x) {
-  SL_F u = 1.0 + x, v = u - 1.0, c = (1.0 - (u - v)) + (x - v);
-  SL_B b = SL_FN(bits)(u), shifted = b - SL_SQRT_HALF, kk = shifted & ~UINT64_C(0xfffffffffffff);
-  SL_F m = SL_FN(real)(b - kk) - 1.0, d = c * SL_FN(real)(UINT64_C(0x3ff0000000000000) - kk);
-  SL_F f = m + d, lost = (m - f) + d;
-  SL_F r = SL_FN(log_sum)(SL_FIELD(shifted) - SL_FIELD_BIAS, f, lost * (1.0 - f + f * f));
-  r = SL_FN(copysign)(r, x);
-  SL_PATCH1((x > -1.0) & (x < 0x1p1000), r, log1p_rare, x);
+/* 1 + x rounded gives k alone: f = x 2^-k + (2^-k - 1) is exact but for k = 1, x < 1/2, where `lost` is what f cannot
+ * hold.  The sign is x's; that matters for -0 only. */
+static inline SL_F SL_CHECKED(log1p)(SL_F x SL_OK) {
+  SL_B shifted = SL_FN(bits)(1.0 + x) - SL_SQRT_HALF;
+  SL_F k = SL_EXPONENT_OF(shifted) - SL_FIELD_BIAS, scale = SL_FN(real)(SL_ONE - (shifted & ~SL_FRACTION));
+  SL_F xs = x * scale, one = scale - 1.0, f = xs + one, lost = (one - f) + xs;
+  SL_F r = SL_FN(log_sum)(k, f, k * SL_LN2_LO + lost);
+  r = SL_FN(real)(SL_FN(bits)(r) | (SL_FN(bits)(x) & SL_SIGN_BIT));
+  SL_PATCH1(SL_FN(below)(shifted + (SL_SQRT_HALF - UINT64_C(0x3c90000000000000)), UINT64_C(0x41f0000000000000)), r,
+            log1p_rare, x);
   return r;
 }
 
 /* ---- sin, cos, tan --------------------------------------------------------------------------------------
- * x = n pi/2 + r, |r| <= pi/4, r as hi + lo; three 33-bit pieces of pi/2 make n times each exact for |x| < 2^20. */
+ * x = n pi/2 + r, |r| <= pi/4, r as hi + lo.  Two 36-bit pieces of pi/2 and a double: n times a piece is exact. */
+#ifdef SL_CORES
 #ifdef SL_SCALAR
 static inline void sl_mul64(uint64_t a, uint64_t b, uint64_t *hi, uint64_t *lo) {
   uint64_t a0 = a & 0xffffffffu, a1 = a >> 32, b0 = b & 0xffffffffu, b1 = b >> 32;
@@ -349,8 +366,8 @@ static inline void sl_mul64(uint64_t a, uint64_t b, uint64_t *hi, uint64_t *lo) 
   *lo = (mid2 << 32) | (low & 0xffffffffu);
 }
 
-/* Payne and Hanek: the bits of x 2/pi around the binary point, from the bits of 2/pi that matter; |x| >= 2^20.
- * Returns n mod 4 and r = hi + lo; hi is NaN for an infinite or NaN x. */
+/* Payne and Hanek, for |x| >= 2^17: x 2/pi modulo 4 in integers, from the 192 bits of 2/pi that matter for it.
+ * Returns n (modulo 4) and r; r is NaN for an infinite or NaN x. */
 SL_RARE uint64_t sl_reduce_rare(double x, double *hi, double *lo) {
   static const uint64_t two_over_pi[20] = {
       UINT64_C(0),                  UINT64_C(0xa2f9836e4e441529), UINT64_C(0xfc2757d1f534ddc0),
@@ -360,65 +377,59 @@ SL_RARE uint64_t sl_reduce_rare(double x, double *hi, double *lo) {
       UINT64_C(0x1ff897ffde05980f), UINT64_C(0xef2f118b5a0a6d1f), UINT64_C(0x6d367ecf27cb09b7),
       UINT64_C(0x4f463f669e5fea2d), UINT64_C(0x7527bac7ebe5f17b), UINT64_C(0x3d0739f78a5292ea),
       UINT64_C(0x6bfb5fb11f8d5d08), UINT64_C(0x56033046fc7b6bab)};
-  uint64_t b = sl_bits(x), m = (b & UINT64_C(0xfffffffffffff)) | (UINT64_C(1) << 52);
-  uint64_t t[3], p0, p1, p2, h, l, n, sign = 0;
-  int e = (int)((b & SL_EXPONENT) >> 52), first = e - 1075 - 2 + 64, i, shift;
-  double scale;
-  *lo = 0.0;
+  uint64_t b = sl_bits(x), m = (b & SL_FRACTION) | (UINT64_C(1) << 52);
+  uint64_t t[3], p0, p1, p2, h, l, n, sign = b & SL_SIGN_BIT;
+  int e = (int)((b & SL_EXPONENT) >> 52), first = e - 1013, i, shift;
+  double unit;
   if (e == 2047) {
-    *hi = SL_NAN;
+    *hi = *lo = SL_NAN;
     return 0;
   }
-  for (i = 0; i < 3; i++) { /* 192 bits of 2/pi; those before them weigh multiples of 4 turns' quarters */
+  for (i = 0; i < 3; i++) { /* the bits before `first` weigh whole turns */
     int word = first / 64 + i, bit = first % 64;
     t[i] = bit == 0 ? two_over_pi[word] : (two_over_pi[word] << bit) | (two_over_pi[word + 1] >> (64 - bit));
   }
-  sl_mul64(m, t[2], &h, &p2); /* p = m t mod 2^192, in units of 2^-190 quarter turns */
+  sl_mul64(m, t[2], &h, &p2); /* p = m t modulo 2^192; 2^190 is a quarter turn */
   sl_mul64(m, t[1], &n, &l);
   p1 = l + h;
   p0 = m * t[0] + n + (p1 < l);
   n = p0 >> 62;
   p0 = (p0 << 2) | (p1 >> 62);
   p1 = (p1 << 2) | (p2 >> 62);
-  if ((p0 >> 63) != 0) { /* beyond the half: take the next quarter, go back */
+  if ((p0 >> 63) != 0) { /* past the middle of the quarter: the next one, less the rest */
     n++;
-    sign = SL_SIGN_BIT;
-    p1 = ~p1;
     p0 = ~p0;
+    p1 = ~p1;
+    sign ^= SL_SIGN_BIT;
   }
   for (shift = 0; (p0 >> 63) == 0 && shift < 63; shift++) {
     p0 = (p0 << 1) | (p1 >> 63);
     p1 <<= 1;
   }
-  sl_mul64(p0, UINT64_C(0xc90fdaa22168c235), &h, &l); /* pi/2 in units of 2^-63 */
-  scale = sl_real((uint64_t)(1023 - 63 - shift) << 52);
-  *hi = sl_real(sl_bits((double)(h >> 11) * 0x1p11 * scale) ^ sign);
-  *lo = sl_real(sl_bits((double)(h & 0x7ff) * scale) ^ sign);
-  if ((b & SL_SIGN_BIT) != 0) {
-    *hi = -*hi;
-    *lo = -*lo;
-    n = 0 - n;
-  }
-  return n;
+  sl_mul64(p0, UINT64_C(0xc90fdaa22168c235), &h, &l); /* times pi/2, in units of 2^-63 */
+  unit = sl_real((uint64_t)(1023 - 63 - shift) << 52);
+  *hi = sl_copysign((double)(h >> 11) * 0x1p11 * unit, sl_real(sign));
+  *lo = sl_copysign((double)(h & 0x7ff) * unit, sl_real(sign));
+  return (b & SL_SIGN_BIT) != 0 ? 0 - n : n;
 }
 #endif
+#endif
 
-/* n in the low bits of the result; r = *hi + *lo */
-static inline SL_B SL_FN(reduce)(SL_F x, SL_F *hi, SL_F *lo) {
-  SL_F t = x * 0x1.45f306dc9c883p-1 + SL_ROUND, n = t - SL_ROUND;
-  SL_F a = x - n * 0x1.921fb544p+0;
-  SL_F b = n * 0x1.0b4611a6p-34, c = a - b, d = (a - c) - b;
-  SL_F e = n * 0x1.3198a2ep-69, f = c - e, g = ((c - f) - e) + (d - n * 0x1.b839a252049c1p-104);
-  SL_B q = SL_FN(bits)(t);
-  *hi = f;
-  *lo = g;
-  SL_PATCH_REDUCE(SL_FN(fabs)(x) < 0x1p20, x, hi, lo, q);
-  return q;
+/* n in the low bits of the result */
+static inline SL_B SL_CHECKED(reduce)(SL_F x, SL_F *hi, SL_F *lo SL_OK) {
+  SL_F t = x * 0x1.45f306dc9c883p-1 + SL_ROUND, k = t - SL_ROUND;
+  SL_F a = x - k * 0x1.921fb54440000p+0, b = k * 0x1.68c234c4c0000p-39, r = a - b;
+  SL_B n = SL_FN(bits)(t);
+  *hi = r;
+  *lo = ((a - r) - b) - k * 0x1.98a2e03707345p-77;
+  SL_PATCH_REDUCE(SL_FN(fabs)(x) < 0x1p17, x, hi, lo, n);
+  return n;
 }
 
-static inline void SL_FN(sincos)(SL_F x, SL_F *sine, SL_F *cosine) {
-  SL_F r, y, z, w, v, half, s, c, one;
-  SL_B n = SL_FN(reduce)(x, &r, &y);
+/* Both polynomials of r, swapped and signed by n. */
+static inline void SL_CHECKED(sincos)(SL_F x, SL_F *sine, SL_F *cosine SL_OK) {
+  SL_F r, y, z, w, v, half, s, c;
+  SL_B n = SL_CHECKED(reduce)(x, &r, &y SL_PASS_OK), odd = n << 63, upper = n << 62;
   z = r * r;
   w = z * z;
   v = z * r;
@@ -426,32 +437,31 @@ static inline void SL_FN(sincos)(SL_F x, SL_F *sine, SL_F *cosine) {
   s = (-0x1.5555555555549p-3 + z * 0x1.111111110f87ap-7) +
       w * ((-0x1.a01a019c11992p-13 + z * 0x1.71de3577b6633p-19) +
            w * (-0x1.ae5e663a62750p-26 + z * 0x1.5d9300ee9c9afp-33));
-  s = r - ((half * y - y) - v * s);
   c = (0x1.555555555554cp-5 + z * -0x1.6c16c16c1517ep-10) +
       w * ((0x1.a01a019cb1bd8p-16 + z * -0x1.27e4f809f0783p-22) +
            w * (0x1.1ee9ebe91257dp-29 + z * -0x1.8fae9c690c6dcp-37));
-  one = 1.0 - half;
-  c = one + (((1.0 - one) - half) + (w * c - r * y));
-  *sine = SL_FN(real)(SL_FN(bits)(SL_FN(pick)(n << 63, s, c)) ^ ((n << 62) & SL_SIGN_BIT));
-  *cosine = SL_FN(real)(SL_FN(bits)(SL_FN(pick)(n << 63, c, s)) ^ (((n + 1) << 62) & SL_SIGN_BIT));
+  s = r - ((half * y - y) - v * s);
+  c = 1.0 - (half - (w * c - r * y));
+  *sine = SL_FN(real)(SL_FN(bits)(SL_FN(pick)(odd, s, c)) ^ (upper & SL_SIGN_BIT));
+  *cosine = SL_FN(real)(SL_FN(bits)(SL_FN(pick)(odd, c, s)) ^ ((upper ^ odd) & SL_SIGN_BIT));
 }
 
-static inline SL_F SL_FN(sin)(SL_F x) {
+static inline SL_F SL_CHECKED(sin)(SL_F x SL_OK) {
   SL_F s, c;
-  SL_FN(sincos)(x, &s, &c);
+  SL_CHECKED(sincos)(x, &s, &c SL_PASS_OK);
   return s;
 }
 
-static inline SL_F SL_FN(cos)(SL_F x) {
+static inline SL_F SL_CHECKED(cos)(SL_F x SL_OK) {
   SL_F s, c;
-  SL_FN(sincos)(x, &s, &c);
+  SL_CHECKED(sincos)(x, &s, &c SL_PASS_OK);
   return c;
 }
 
-/* tan r = r + r^3 T(r^2); in odd quarters -1/tan r, divided with the remainder carried along. */
-static inline SL_F SL_FN(tan)(SL_F x) {
+/* tan r = r + r^3 T(r^2); in odd quarters -1 / tan r, divided with the remainder carried along. */
+static inline SL_F SL_CHECKED(tan)(SL_F x SL_OK) {
   SL_F r, y, z, w, w2, u, t, tl, th, q, qh, p;
-  SL_B n = SL_FN(reduce)(x, &r, &y);
+  SL_B n = SL_CHECKED(reduce)(x, &r, &y SL_PASS_OK);
   z = r * r;
   w = z * z;
   w2 = w * w;
@@ -475,21 +485,21 @@ static inline SL_F SL_FN(tan)(SL_F x) {
 
 /* ---- the cube-root family -------------------------------------------------------------------------------
  * y ~ x^(-1/3) from the bits of x divided by -3 (in floating point: lanes have no 64-bit division), one step of
- * third order, then cut to 17 bits so that y^3 is exact: x^(-1/3) = y (1 + d) with d from h = 1 - x y^3. */
+ * third order, then cut to 17 bits so that y^3 is exact: x^(-1/3) = y (1 + d), d from h = 1 - x y^3. */
+#ifdef SL_CORES
 static inline SL_F SL_FN(rcbrt_parts)(SL_F x, SL_F *d) {
   SL_F t = SL_FN(real)((SL_FN(bits)(x) >> 20) | UINT64_C(0x4330000000000000));
   SL_F y = SL_FN(real)(SL_FN(bits)(0x1.55aa943ece2a5p+52 - t * 0x1.5555555555555p-2) << 20);
   SL_F h = 1.0 - x * (y * y * y);
-  y = y + (y * h) * ((0x1.5553d34e15d9fp-2 + h * 0x1.c9afb5eeada12p-3) + (h * h) * 0x1.65cc774f45369p-3);
+  y = y + (y * h) * (0x1.5553d34e15d9fp-2 + h * (0x1.c9afb5eeada12p-3 + h * 0x1.65cc774f45369p-3));
   y = SL_FN(real)(SL_FN(bits)(y) & UINT64_C(0xfffffff000000000));
   h = 1.0 - x * (y * y * y);
-  *d = h * ((0x1.5555555555555p-2 + h * 0x1.c71c71c71c71cp-3) + (h * h) * 0x1.61f9add3c0ca4p-3);
+  *d = h * (0x1.5555555555555p-2 + h * (0x1.c71c71c71c71cp-3 + h * 0x1.61f9add3c0ca4p-3));
   return y;
 }
 
-
-/* x^(-1/3), x^(-2/3) = y^2 (1 + d)^2, x^(1/3) = x y^2 (1 + d)^2, x^(2/3) = x y (1 + d): the leading products are exact,
- * x cut to 19 or 26 bits for that, and the small rest is added last. */
+/* x^(-1/3), x^(-2/3) = y^2 (1 + d)^2, x^(1/3) = x y^2 (1 + d)^2, x^(2/3) = x y (1 + d).  The leading products are
+ * exact, x cut to 19 or 26 bits for that, and the small rest is added last. */
 static inline SL_F SL_FN(m1_3_sum)(SL_F x) {
   SL_F d, y = SL_FN(rcbrt_parts)(x, &d);
   return y + y * d;
@@ -515,17 +525,17 @@ static inline SL_F SL_FN(p2_3_sum)(SL_F x) {
 #ifdef SL_SCALAR
 /* x^(thirds/3) of what the fast path leaves out: zeros, infinities, NaN, negative, very small and very large x. */
 SL_RARE double sl_thirds_rare(double x, int thirds) {
-  double to, unit; /* x is multiplied by `to` = 2^(-+600), the result by unit^thirds */
+  double scale, back; /* (scale x)^(1/3) back = x^(1/3) */
   if (x != x) return x;
   if (x == 0.0 || sl_fabs(x) == SL_INF) return (x == 0.0) == (thirds > 0) ? 0.0 : SL_INF;
   if (x < 0.0) return SL_NAN;
-  to = x < 1.0 ? 0x1p600 : 0x1p-600;
-  unit = x < 1.0 ? 0x1p-200 : 0x1p200;
+  scale = x < 1.0 ? 0x1p600 : 0x1p-600;
+  back = x < 1.0 ? 0x1p-200 : 0x1p200;
   switch (thirds) {
-    case 1: return sl_p1_3_sum(x * to) * unit;
-    case 2: return sl_p2_3_sum(x * to) * (unit * unit);
-    case -1: return sl_m1_3_sum(x * to) / unit;
-    default: return sl_m2_3_sum(x * to) / (unit * unit);
+    case 1: return sl_p1_3_sum(x * scale) * back;
+    case 2: return sl_p2_3_sum(x * scale) * (back * back);
+    case -1: return sl_m1_3_sum(x * scale) / back;
+    default: return sl_m2_3_sum(x * scale) / (back * back);
   }
 }
 SL_RARE double sl_p1_3_rare(double x) { return sl_thirds_rare(x, 1); }
@@ -537,54 +547,81 @@ SL_DEFINE_PATCH1(p1_3_rare)
 SL_DEFINE_PATCH1(p2_3_rare)
 SL_DEFINE_PATCH1(m1_3_rare)
 SL_DEFINE_PATCH1(m2_3_rare)
+#endif
+/* 2^-1000 <= x < 2^1000, where y^3 is neither denormal nor infinite */
+#define SL_THIRDS_OK(x) \
+  SL_FN(below)(SL_FN(bits)(x) - UINT64_C(0x0170000000000000), UINT64_C(0x7d00000000000000))
 
-static inline SL_F SL_FN(pow_p1_3)(SL_F x) {
+static inline SL_F SL_CHECKED(pow_p1_3)(SL_F x SL_OK) {
   SL_F r = SL_FN(p1_3_sum)(x);
-  SL_PATCH1((x > 0x1p-1000) & (x < 0x1p1000), r, p1_3_rare, x);
+  SL_PATCH1(SL_THIRDS_OK(x), r, p1_3_rare, x);
   return r;
 }
 
-static inline SL_F SL_FN(pow_p2_3)(SL_F x) {
+static inline SL_F SL_CHECKED(pow_p2_3)(SL_F x SL_OK) {
   SL_F r = SL_FN(p2_3_sum)(x);
-  SL_PATCH1((x > 0x1p-1000) & (x < 0x1p1000), r, p2_3_rare, x);
+  SL_PATCH1(SL_THIRDS_OK(x), r, p2_3_rare, x);
   return r;
 }
 
-static inline SL_F SL_FN(pow_m1_3)(SL_F x) {
+static inline SL_F SL_CHECKED(pow_m1_3)(SL_F x SL_OK) {
   SL_F r = SL_FN(m1_3_sum)(x);
-  SL_PATCH1((x > 0x1p-1000) & (x < 0x1p1000), r, m1_3_rare, x);
+  SL_PATCH1(SL_THIRDS_OK(x), r, m1_3_rare, x);
   return r;
 }
 
-static inline SL_F SL_FN(pow_m2_3)(SL_F x) {
+static inline SL_F SL_CHECKED(pow_m2_3)(SL_F x SL_OK) {
   SL_F r = SL_FN(m2_3_sum)(x);
-  SL_PATCH1((x > 0x1p-1000) & (x < 0x1p1000), r, m2_3_rare, x);
+  SL_PATCH1(SL_THIRDS_OK(x), r, m2_3_rare, x);
   return r;
 }
 
-static inline SL_F SL_FN(cbrt)(SL_F x) { return SL_FN(copysign)(SL_FN(pow_p1_3)(SL_FN(fabs)(x)), x); }
+static inline SL_F SL_CHECKED(cbrt)(SL_F x SL_OK) {
+  return SL_FN(copysign)(SL_CHECKED(pow_p1_3)(SL_FN(fabs)(x) SL_PASS_OK), x);
+}
 
 /* ---- pow ------------------------------------------------------------------------------------------------
- * Exponents with a kernel of their own.  pow(-0, 1/2) = +0 and pow(-inf, 1/2) = +inf, unlike sqrt. */
-static inline SL_F SL_FN(pow_p1_2)(SL_F x) {
-  return SL_FN(select)(x == -SL_INF, SL_FN(set)(SL_INF), SL_FN(sqrt)(x) + 0.0);
-}
-static inline SL_F SL_FN(pow_m1_2)(SL_F x) { return 1.0 / SL_FN(pow_p1_2)(x); }
-static inline SL_F SL_FN(pow_p3_2)(SL_F x) {
-  return SL_FN(select)(x == -SL_INF, SL_FN(set)(SL_INF), x * SL_FN(sqrt)(x));
-}
+ * First the other exponents with a kernel of their own. */
+#ifdef SL_CORES
 static inline SL_F SL_FN(pow_p1)(SL_F x) { return x; }
 static inline SL_F SL_FN(pow_m1)(SL_F x) { return 1.0 / x; }
 static inline SL_F SL_FN(pow_p2)(SL_F x) { return x * x; }
 static inline SL_F SL_FN(pow_p3)(SL_F x) { return x * x * x; }
 
-/* (*hi + *lo) = y log x, about 2^-64 relative, for normal positive x; `bias` is SL_FIELD_BIAS plus what x was scaled by.
- * x = 2^k m, m / c near 1 with c one of four 26-bit numbers whose logarithm is almost a double;
- * s = (m - c) / (m + c) as sh + sl, log m = log c + 2 atanh s. */
+#ifdef SL_SCALAR /* unlike sqrt, pow(-inf, 1/2) = +inf */
+SL_RARE double sl_half_rare(double x) { return -x; }
+SL_RARE double sl_minus_half_rare(double x) { return -1.0 / x; }
+#endif
+SL_DEFINE_PATCH1(half_rare)
+SL_DEFINE_PATCH1(minus_half_rare)
+#endif
+
+static inline SL_F SL_CHECKED(pow_p1_2)(SL_F x SL_OK) {
+  SL_F r = SL_FN(sqrt)(x) + 0.0; /* +0 for -0 */
+  SL_PATCH1(x != -SL_INF, r, half_rare, x);
+  return r;
+}
+
+static inline SL_F SL_CHECKED(pow_m1_2)(SL_F x SL_OK) {
+  SL_F r = 1.0 / (SL_FN(sqrt)(x) + 0.0);
+  SL_PATCH1(x != -SL_INF, r, minus_half_rare, x);
+  return r;
+}
+
+static inline SL_F SL_CHECKED(pow_p3_2)(SL_F x SL_OK) {
+  SL_F r = x * SL_FN(sqrt)(x);
+  SL_PATCH1(x != -SL_INF, r, half_rare, x);
+  return r;
+}
+
+#ifdef SL_CORES
+/* *hi + *lo = y log x to about 2^-63 relative, for normal positive x with its bits shifted by SL_POW_START and `bias`
+ * SL_FIELD_BIAS plus the scaling of x.  x = 2^k m; m / c is near 1 for one of four 26-bit numbers c whose logarithms
+ * are almost doubles; s = (m - c) / (m + c) as sh + sl, log m = log c + 2 atanh s. */
 #define SL_POW_START UINT64_C(0x3fed580000000000)
-static inline void SL_FN(pow_log)(SL_F x, SL_F y, double bias, SL_F *hi, SL_F *lo) {
-  SL_B b = SL_FN(bits)(x), shifted = b - SL_POW_START, first = shifted << 12, second = shifted << 13;
-  SL_F k = SL_FIELD(shifted) - bias, m = SL_FN(real)(b - (shifted & ~UINT64_C(0xfffffffffffff)));
+static inline void SL_FN(pow_log)(SL_B shifted, SL_F y, double bias, SL_F *hi, SL_F *lo) {
+  SL_B first = shifted << 12, second = shifted << 13;
+  SL_F k = SL_EXPONENT_OF(shifted) - bias, m = SL_FN(real)((shifted & SL_FRACTION) + SL_POW_START);
   SL_F c = SL_FN(pick)(first, SL_FN(pick)(second, SL_FN(set)(1.0), SL_FN(set)(0x1.2d26acp+0)),
                        SL_FN(pick)(second, SL_FN(set)(0x1.72d4cp+0), SL_FN(set)(0x1.b372a8p+0)));
   SL_F log_c = SL_FN(pick)(first, SL_FN(pick)(second, SL_FN(set)(0.0), SL_FN(set)(0x1.4caa7dcbe8acfp-3)),
@@ -595,8 +632,8 @@ static inline void SL_FN(pow_log)(SL_F x, SL_F y, double bias, SL_F *hi, SL_F *l
   SL_F z = s * s, w = z * z;
   SL_F p = (0x1.5555555555555p-1 + z * 0x1.9999999999ac0p-2) +
            w * ((0x1.2492492413f3bp-2 + z * 0x1.c71c74dd75d28p-3) + w * (0x1.745845c8bb19fp-3 + z * 0x1.3eba96fda56c4p-3));
-  SL_F kl = k * 0x1.62e42fefa38p-1, t = kl + log_c, tl = (kl - t) + log_c;
-  SL_F sh2 = sh + sh, h = t + sh2, rest = (tl + k * 0x1.ef35793c7673p-45) + ((sl + sl) + (z + z) * ds);
+  SL_F kl = k * SL_LN2_HI, t = kl + log_c, tl = (kl - t) + log_c;
+  SL_F sh2 = sh + sh, h = t + sh2, rest = (tl + k * SL_LN2_LO) + ((sl + sl) + (z + z) * ds);
   SL_F l = (((t - h) + sh2) + rest) + (s * z) * p;
   SL_F lh = SL_FN(real)(SL_FN(bits)(h + l) & SL_HIGH_26), ll = (h - lh) + l;
   SL_F yh = SL_FN(real)(SL_FN(bits)(y) & SL_HIGH_26);
@@ -613,7 +650,7 @@ static inline int sl_parity(double y) {
   return sl_floor(h) == h ? 2 : 1;
 }
 
-/* C99 Annex F.9.4.4 in its order, then the general case with every scaling. */
+/* C99 F.9.4.4, then the general case with every scaling. */
 SL_RARE double sl_pow_rare(double x, double y) {
   double a = sl_fabs(x), hi, lo, bias = SL_FIELD_BIAS, r;
   int parity;
@@ -629,41 +666,46 @@ SL_RARE double sl_pow_rare(double x, double y) {
       a *= 0x1p54;
       bias += 54.0;
     }
-    sl_pow_log(a, y, bias, &hi, &lo);
+    sl_pow_log(sl_bits(a) - SL_POW_START, y, bias, &hi, &lo);
     r = sl_exp_sum_rare(hi, lo);
   }
   return parity == 1 ? sl_copysign(r, x) : r;
 }
 #endif
 SL_DEFINE_PATCH2(pow_rare)
+#endif
 
 /* pow for exponents that are not listed below. */
-static inline SL_F SL_FN(pow_general)(SL_F x, SL_F y) {
+static inline SL_F SL_CHECKED(pow_general)(SL_F x, SL_F y SL_OK) {
+  SL_B shifted = SL_FN(bits)(x) - SL_POW_START;
   SL_F hi, lo, r;
-  SL_FN(pow_log)(x, y, SL_FIELD_BIAS, &hi, &lo);
+  SL_FN(pow_log)(shifted, y, SL_FIELD_BIAS, &hi, &lo);
   r = SL_FN(exp_sum)(hi, lo);
-  SL_PATCH2((x >= DBL_MIN) & (x <= DBL_MAX) & (SL_FN(fabs)(hi) < 708.0), r, pow_rare, x, y);
+  SL_PATCH2(SL_IS_NORMAL(shifted, SL_POW_START) & (SL_FN(fabs)(hi) < 708.0), r, pow_rare, x, y);
   return r;
 }
 
-/* The exponents at which pow(x, y) is by definition the kernel pow_name(x); 1/3 and 2/3 are the nearest doubles. */
-#define SL_POW_LIST(entry)          \
-  entry(0x1.5555555555555p-2, p1_3) \
-  entry(-0x1.5555555555555p-2, m1_3)\
-  entry(0x1.5555555555555p-1, p2_3) \
-  entry(-0x1.5555555555555p-1, m2_3)\
-  entry(0.5, p1_2)                  \
-  entry(-0.5, m1_2)                 \
-  entry(1.5, p3_2)                  \
-  entry(1.0, p1)                    \
-  entry(-1.0, m1)                   \
-  entry(2.0, p2)                    \
+/* The exponents y at which pow(x, y) is by definition the kernel pow_name(x); 1/3 and 2/3 are the nearest doubles.
+ * Their fractions have nothing, or 0101...01, below the first bit: that is how SL_POW_LISTED knows them. */
+#define SL_POW_LIST(entry)           \
+  entry(0x1.5555555555555p-2, p1_3)  \
+  entry(-0x1.5555555555555p-2, m1_3) \
+  entry(0x1.5555555555555p-1, p2_3)  \
+  entry(-0x1.5555555555555p-1, m2_3) \
+  entry(0.5, p1_2)                   \
+  entry(-0.5, m1_2)                  \
+  entry(1.5, p3_2)                   \
+  entry(1.0, p1)                     \
+  entry(-1.0, m1)                    \
+  entry(2.0, p2)                     \
   entry(3.0, p3)
+#define SL_POW_LISTED(low) (((low) == UINT64_C(0)) | ((low) == UINT64_C(0xaaaaaaaaaaaaa000)))
+
+#ifdef SL_CORES
 #define SL_POW_ALL(value, name) if (SL_FN(all)(y == (value))) return SL_FN(pow_##name)(x);
 #define SL_POW_ANY(value, name) if (SL_FN(any)(y == (value))) r = SL_FN(select)(y == (value), SL_FN(pow_##name)(x), r);
-
 /* pow where at least one lane may have a listed exponent. */
-SL_LISTED_INLINE SL_F SL_FN(pow_listed)(SL_F x, SL_F y) {
+SL_POW_INLINE SL_F SL_FN(pow_listed)(SL_F x, SL_F y) {
   SL_F r;
   SL_POW_LIST(SL_POW_ALL)
   r = SL_FN(pow_general)(x, y);
@@ -673,22 +715,32 @@ SL_LISTED_INLINE SL_F SL_FN(pow_listed)(SL_F x, SL_F y) {
 #undef SL_POW_ALL
 #undef SL_POW_ANY
 
-/* A listed exponent has nothing, or 0101...01, below the first bit of its fraction. */
 static inline SL_F SL_FN(pow)(SL_F x, SL_F y) {
   SL_B low = SL_FN(bits)(y) << 13;
-  if (SL_LIKELY(!SL_FN(any)((low == 0) | (low == UINT64_C(0xaaaaaaaaaaaaa000))))) return SL_FN(pow_general)(x, y);
+  if (SL_LIKELY(!SL_FN(any)(SL_POW_LISTED(low)))) return SL_FN(pow_general)(x, y);
   return SL_FN(pow_listed)(x, y);
 }
-#endif /* SL_FN */
+#else
+static inline SL_F SL_CHECKED(pow)(SL_F x, SL_F y SL_OK) {
+  SL_B low = SL_FN(bits)(y) << 13;
+  *ok &= SL_FN(not)(SL_POW_LISTED(low));
+  return SL_CHECKED(pow_general)(x, y SL_PASS_OK);
+}
+#endif
 
 #undef SL_F
 #undef SL_B
 #undef SL_M
 #undef SL_FN
+#undef SL_CHECKED
+#undef SL_OK
+#undef SL_PASS_OK
 #undef SL_SCALAR
+#undef SL_CORES
+#undef SL_POW_INLINE
 #undef SL_DEFINE_PATCH1
 #undef SL_DEFINE_PATCH2
 #undef SL_PATCH1
 #undef SL_PATCH2
 #undef SL_PATCH_REDUCE
-#undef SL_LISTED_INLINE
+#endif /* SL_FN */

@@ -6,9 +6,12 @@ Guo et al. 2023, J. Mar. Sci. Eng. 11(3) 474, equation (1). In the base frame th
 
 from __future__ import annotations
 
+import math
+
 import casadi as ca
 
 from springline.model.parameters import POSITIVE, REAL, Joint, Parameter, Values
+from springline.model.signals import SineTerm
 
 
 class TransferManipulator:
@@ -32,6 +35,11 @@ class TransferManipulator:
         Parameter("k_s2", "N/m", 2.0e6, "stiffness of the lift spring", POSITIVE),
         Parameter("k_s3", "N m/rad", 2.0e4, "stiffness of the rotation spring", POSITIVE),
     )
+    # The paper's experiment (section 7): y_d = sin(pi t), theta_d = 1 + sin(pi t / 2), from (0.8, 0.5) at rest.
+    reference_offset = (0.0, 1.0)
+    reference_terms = ((SineTerm(1.0, math.pi),), (SineTerm(1.0, math.pi / 2),))
+    start_position = (0.8, 0.5)
+    start_rate = (0.0, 0.0)
 
     def positions(self, q: ca.SX, p: Values) -> tuple[ca.SX, ca.SX]:
         """Centroids of the lifting and the rotating part, 3 x 1, m, base frame."""

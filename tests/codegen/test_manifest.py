@@ -139,9 +139,7 @@ def garbled_manifest(folder: Path) -> str:
     return "manifest.json: not written by springline"
 
 
-@pytest.mark.parametrize(
-    "disturb", [edit_replaced, edit_removed, foreign_file, foreign_manifest, garbled_manifest]
-)
+@pytest.mark.parametrize("disturb", [edit_replaced, edit_removed, foreign_file, foreign_manifest, garbled_manifest])
 def test_conflict_is_refused_and_force_overrides(disturb: Callable[[Path], str], folder: Path) -> None:
     expected = disturb(folder)
     before = contents(folder)
@@ -208,9 +206,7 @@ def dangling_link(folder: Path) -> str:
     "disturb", [folder_for_a_file, file_for_a_folder, link_for_a_file, link_for_a_folder, dangling_link]
 )
 @pytest.mark.parametrize("force", [False, True])
-def test_folders_and_links_are_never_replaced(
-    disturb: Callable[[Path], str], force: bool, folder: Path
-) -> None:
+def test_folders_and_links_are_never_replaced(disturb: Callable[[Path], str], force: bool, folder: Path) -> None:
     path = disturb(folder)
     before = contents(folder.parent)
     with pytest.raises(FolderConflict, match=f"\n  {path}: is a link, or a folder") as caught:
@@ -343,9 +339,7 @@ def test_check_sees_a_foreign_file_in_the_way(folder: Path) -> None:
 def test_check_sees_a_reformatted_manifest(folder: Path) -> None:
     manifest = folder / "manifest.json"
     manifest.write_text(json.dumps(json.loads(manifest.read_bytes())))
-    assert check_tree(folder, OLD, OLD_INFO) == [
-        Stale("manifest.json", "changed", "is written in another form")
-    ]
+    assert check_tree(folder, OLD, OLD_INFO) == [Stale("manifest.json", "changed", "is written in another form")]
 
 
 def test_long_differences_are_cut(folder: Path) -> None:
@@ -371,8 +365,6 @@ def test_canonical_json_refuses(value: Any, error: type[Exception]) -> None:
         canonical_json({"value": value})
 
 
-@given(
-    st.dictionaries(st.text(), st.floats(allow_nan=False, allow_infinity=False) | st.integers() | st.text())
-)
+@given(st.dictionaries(st.text(), st.floats(allow_nan=False, allow_infinity=False) | st.integers() | st.text()))
 def test_canonical_json_reads_back(value: dict[str, Any]) -> None:
     assert json.loads(canonical_json(value)) == value

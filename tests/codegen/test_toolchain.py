@@ -213,9 +213,7 @@ def test_shared_cache_keeps_machines_apart(wrap: Callable[[str, str], Compiler])
     portable = {"main": "main.c", "flags": ["-O2"]}
     assert "__AVX9000F__" in predefined_macros(there, ["-march=native"])
     assert build_library(SOURCES, compiler=here, **native) != build_library(SOURCES, compiler=there, **native)
-    assert build_library(SOURCES, compiler=here, **portable) == build_library(
-        SOURCES, compiler=there, **portable
-    )
+    assert build_library(SOURCES, compiler=here, **portable) == build_library(SOURCES, compiler=there, **portable)
 
 
 def test_same_bytes_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -296,9 +294,7 @@ def garble_the_checksum(entry: Path) -> None:
     (entry / "library.sha256").write_bytes(b"\xff\x00")
 
 
-@pytest.mark.parametrize(
-    "damage", [truncate, flip_a_bit, lose_the_library, lose_the_checksum, garble_the_checksum]
-)
+@pytest.mark.parametrize("damage", [truncate, flip_a_bit, lose_the_library, lose_the_checksum, garble_the_checksum])
 def test_damaged_entry_is_rebuilt(damage: Callable[[Path], None]) -> None:
     library = build_library(SOURCES, main="main.c")
     image = library.read_bytes()
@@ -334,9 +330,7 @@ def test_threads_building_at_once(counted: tuple[Compiler, Callable[[], int]]) -
     compiler, builds = counted
     libraries: list[Path] = []
     threads = [
-        threading.Thread(
-            target=lambda: libraries.append(build_library(SOURCES, main="main.c", compiler=compiler))
-        )
+        threading.Thread(target=lambda: libraries.append(build_library(SOURCES, main="main.c", compiler=compiler)))
         for _ in range(4)
     ]
     for thread in threads:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 import sympy as sp
+
 from springline.model.system import Structure, System
 
 Array = np.ndarray

@@ -1,0 +1,1 @@
+"""From symbolic Functions to C, and from C to loaded code."""

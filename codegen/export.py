@@ -1,0 +1,239 @@
+"""What an export is printed from: a system with its numbers bound, the names to use, and a hash of all of it."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from importlib.metadata import version
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from springline.codegen.manifest import canonical_json
+from springline.codegen.program import count_operations
+from springline.model.base import COORDINATES
+from springline.model.parameters import Slot
+from springline.model.sliding import LAWS
+from springline.model.system import Structure, System
+
+Real = Literal["double", "float"]
+
+MODEL_FUNCTIONS = (
+    "mass_matrix",
+    "coriolis",
+    "gravity",
+    "base_disturbance",
+    "plant",
+    "slow_dynamics",
+    "fast_dynamics",
+    "quasi_steady_force",
+    "slow_control",
+    "fast_control",
+    "control",
+    *(f"law_{name}" for name in LAWS),
+)
+"""Functions of a System that an export offers under <prefix>_<name>."""
+
+
+@dataclass(frozen=True, slots=True)
+class Port:
+    """An input or output of a function: shape (rows, columns), and per entry (column by column) name and SI unit."""
+
+    name: str
+    shape: tuple[int, int]
+    labels: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Export:
+    """A system whose parameters are bound: tunable (an argument of the C) or baked (a constant in it).
+
+    values   of all slots, in their order
+    tunable  indices of the slots that stay arguments, ascending
+    prefix   of every public name
+    real     number type of the C
+    """
+
+    system: System
+    values: tuple[float, ...]
+    tunable: tuple[int, ...]
+    prefix: str = "springline"
+    real: Real = "double"
+
+    @property
+    def slots(self) -> tuple[Slot, ...]:
+        """All parameters."""
+        return self.system.slots
+
+    @property
+    def tunable_slots(self) -> tuple[Slot, ...]:
+        """The parameters that stay arguments, in the order of the packed p."""
+        return tuple(self.slots[i] for i in self.tunable)
+
+    @cached_property
+    def baked(self) -> tuple[int, ...]:
+        """Indices of the slots that become constants, ascending."""
+        return tuple(i for i in range(len(self.slots)) if i not in set(self.tunable))
+
+    def model_functions(self) -> Iterator[tuple[str, ca.Function]]:
+        """Public name and frozen Function (last input p: all slots) of everything in MODEL_FUNCTIONS."""
+        for name in MODEL_FUNCTIONS:
+            yield f"{self.prefix}_{name}", self.system.function(name)
+
+    def inputs(self, function: ca.Function) -> list[Port]:
+        """Inputs of a Function as exported: p holds the tunable slots alone and is left out where there are none."""
+        ports = [
+            self._port(function.name_in(i), function.size_in(i))
+            for i in range(function.n_in())
+            if function.name_in(i) != "p"
+        ]
+        if self.tunable:
+            labels = tuple(slot.symbol for slot in self.tunable_slots)
+            units = tuple(slot.unit for slot in self.tunable_slots)
+            ports.append(Port("p", (len(labels), 1), labels, units))
+        return ports
+
+    def outputs(self, function: ca.Function) -> list[Port]:
+        """Outputs of a Function."""
+        return [self._port(function.name_out(i), function.size_out(i)) for i in range(function.n_out())]
+
+    def _port(self, name: str, shape: tuple[int, int]) -> Port:
+        entries = port_entries(self.system)[name]
+        if len(entries) != shape[0] * shape[1]:  # a reaching law works on one joint, whichever it is
+            entries = [(name, "1/s of the joint's unit" if name == "sigma" else "1/s^2 of the joint's unit")]
+        return Port(name, shape, tuple(label for label, _ in entries), tuple(unit for _, unit in entries))
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of model, parameters and options: it changes if and only if the exported files may."""
+        identity = {
+            "model": [_instructions(function) for function in self.system.functions.values()],
+            "structure": asdict(self.system.structure),
+            "parameters": {slot.key: value for slot, value in zip(self.slots, self.values, strict=True)},
+            "tunable": [slot.key for slot in self.tunable_slots],
+            "prefix": self.prefix,
+            "real": self.real,
+        }
+        return hashlib.sha256(canonical_json(identity)).hexdigest()
+
+
+def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
+    """Name and SI unit of each entry, column by column, of every input and output that a System's Functions have."""
+    joints = system.joints
+
+    def coordinate(quantity: str, suffix: str = "") -> list[tuple[str, str]]:
+        return [(f"{quantity}_{j.name}", j.unit + suffix) for j in joints]
+
+    def force(quantity: str, suffix: str = "") -> list[tuple[str, str]]:
+        return [(f"{quantity}_{j.name}", j.force + suffix) for j in joints]
+
+    def base(derivative: str, suffix: str) -> list[tuple[str, str]]:
+        return [(f"{derivative}{c.symbol}", c.unit + suffix) for c in COORDINATES]
+
+    rates = {quantity: coordinate(quantity, "/s") for quantity in ("dq1", "dq2", "dq1d", "sigma")}
+    accelerations = {q: coordinate(q, "/s^2") for q in ("ddq1", "ddq2", "ddq1d", "dsigma")}
+    positions = {quantity: coordinate(quantity) for quantity in ("q1", "q2", "q1d", "e")}
+    return {
+        **positions,
+        **rates,
+        **accelerations,
+        **{name: force(name) for name in ("u", "u_s", "u_f", "G", "C_dq1", "S", "z_bar", "eta")},
+        "ddeta": force("ddeta", "/s^2"),
+        "b": base("", ""),
+        "db": base("d_", "/s"),
+        "ddb": base("dd_", "/s^2"),
+        "t": [("t", "s")],
+        "w": [
+            *positions["q1d"],
+            *rates["dq1d"],
+            *accelerations["ddq1d"],
+            *(entry for order in (("", ""), ("d_", "/s"), ("dd_", "/s^2")) for entry in base(*order)),
+        ],
+        "x": [*positions["q1"], *rates["dq1"], *positions["q2"], *rates["dq2"]],
+        "dx": [*rates["dq1"], *accelerations["ddq1"], *rates["dq2"], *accelerations["ddq2"]],
+        "M1": [
+            (f"M1_{row.name}_{column.name}", f"{row.force} s^2/{column.unit}") for column in joints for row in joints
+        ],
+    }
+
+
+def bind(
+    structure: Structure,
+    values: NDArray[np.float64],
+    *,
+    tunable: Sequence[str] | Literal["all", "none"] = "none",
+    prefix: str = "springline",
+    real: Real = "double",
+) -> Export:
+    """The Export of a structure with these numbers.
+
+    values   one per System.slots entry, SI
+    tunable  slot keys, or tables or parameters that stand for all their slots ("control", "control.mu")
+    Raises ValueError for a wrong number of values, a value out of its bounds, an unknown name or no C identifier.
+    """
+    system = System(structure)
+    if np.shape(values) != (len(system.slots),):
+        raise ValueError(f"values have shape {np.shape(values)}, expected ({len(system.slots)},)")
+    numbers = tuple(float(value) for value in values)
+    for slot, value in zip(system.slots, numbers, strict=True):
+        if not slot.bounds.holds(value):
+            raise ValueError(f"{slot.key} is {value!r}, expected {slot.bounds}")
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
+        raise ValueError(f"prefix {prefix!r} is no C identifier: letters, digits and _, a letter first")
+    if real not in ("double", "float"):
+        raise ValueError(f"real is {real!r}, expected 'double' or 'float'")
+    return Export(system, numbers, _tunable(system.slots, tunable), prefix, real)
+
+
+def _tunable(slots: Sequence[Slot], names: Sequence[str] | str) -> tuple[int, ...]:
+    if names == "all":
+        return tuple(range(len(slots)))
+    if names == "none":
+        return ()
+    if isinstance(names, str):
+        names = [names]
+    chosen: set[int] = set()
+    for name in names:
+        found = {i for i, slot in enumerate(slots) if f"{slot.key}.".startswith(f"{name}.")}
+        if not found:
+            keys = [slot.key for slot in slots]
+            near = difflib.get_close_matches(name, keys, 1, 0.0)
+            raise ValueError(f"no parameter {name!r}; the nearest name is {near[0]!r}")
+        chosen |= found
+    return tuple(sorted(chosen))
+
+
+def _instructions(function: ca.Function) -> list[object]:
+    """A Function as plain data: name, signature, and every instruction with its constants."""
+    rows: list[object] = [str(function)]
+    for k in range(function.n_instructions()):
+        op = function.instruction_id(k)
+        row = [op, *function.instruction_output(k), *function.instruction_input(k)]
+        rows.append([*row, function.instruction_constant(k)] if op == ca.OP_CONST else row)
+    return rows
+
+
+def provenance(export: Export) -> list[str]:
+    """The lines that every generated file starts with."""
+    return [
+        f"Generated by springline {version('springline')} with CasADi {version('casadi')}; do not edit.",
+        f"SHA-256 of model, parameters and options: {export.sha256}",
+    ]
+
+
+def comment(lines: Sequence[str]) -> str:
+    """A C block comment."""
+    body = "\n".join(f" * {line}".rstrip() for line in lines)
+    return f"/*\n{body}\n */\n"
+
+
+def operations(export: Export) -> dict[str, int]:
+    """Arithmetic operations of each model function, by public name."""
+    return {name: count_operations(function) for name, function in export.model_functions()}

@@ -1,0 +1,169 @@
+"""The files of an export that are mostly fixed text: templates from runtime/export/, their placeholders filled.
+
+A placeholder is {{name}}. The templates say "springline" where the export's prefix goes: in identifiers and file names.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Mapping
+from importlib import resources
+from importlib.metadata import version
+
+from springline.codegen.export import Export, comment, provenance
+from springline.codegen.scalar import literal
+from springline.codegen.typed import STATUS, TypedInterface
+from springline.codegen.vectors import TIME_STEP
+
+
+def text_files(export: Export, interface: TypedInterface) -> dict[str, bytes]:
+    """README, build files, main, self-check and the typed interface, by path."""
+    prefix, start = export.prefix, provenance(export)
+    single = export.real == "float"
+    common = {
+        "prefix": prefix,
+        "real": export.real,
+        "f": "f" if single else "",
+        "math": "slf" if single else "sl",
+        "math_header": "sl_mathf.h" if single else "sl_math.h",
+        "version": version("springline"),
+        **interface.blocks(),
+    }
+    banner = comment(start)
+    table = comment([*start, "", *interface_table(interface)])
+    hashes = "".join(f"# {line}\n" for line in start)
+    return {
+        f"include/{prefix}.h": _fill("springline.h", common, prefix, table),
+        f"src/{prefix}.c": _fill("springline.c", common, prefix, table),
+        "main.c": _fill("main.c", common | _main_blocks(interface), prefix, banner),
+        "self_check.c": _fill("self_check.c", common | _check_blocks(export, interface), prefix, banner),
+        "README.md": _fill("README.md", common | _readme_blocks(export, interface), prefix),
+        "CMakeLists.txt": _fill("CMakeLists.txt", common, prefix, hashes),
+        f"{prefix}.pc.in": _fill("springline.pc.in", common, prefix, hashes),
+    }
+
+
+def _fill(template: str, blocks: Mapping[str, str], prefix: str, banner: str = "") -> bytes:
+    """A template with its placeholders filled and its names carrying the prefix."""
+    text = (resources.files("springline.codegen") / "runtime" / "export" / template).read_text(encoding="utf-8")
+    text = re.sub(r"\{\{(\w+)\}\}", lambda hole: blocks[hole[1]], text)
+    text = re.sub(r"\bspringline(?=_\w|\.(?:h|c|pc)\b)", prefix, text)
+    text = re.sub(r"\bSPRINGLINE(?=_\w)", prefix.upper(), text)
+    return f"{banner}{text}".encode()
+
+
+def interface_table(interface: TypedInterface) -> list[str]:
+    """Structures, units and operation counts, as lines of text for a comment."""
+    lines = [
+        f"{name}: " + ", ".join(f"{field.name} ({field.unit})" for field in members)
+        for name, members in interface.structures.items()
+    ]
+    counts = [f"{name} {body.operations}" for name, body in interface.bodies.items()]
+    wrapped = [part for line in lines for part in textwrap.wrap(line, 110, subsequent_indent="    ")]
+    return [*wrapped, f"operations: {', '.join(counts)} (a plant step takes four plant evaluations)"]
+
+
+def _main_blocks(interface: TypedInterface) -> dict[str, str]:
+    joints = [joint.name for joint in interface.export.system.joints]
+    columns = [("state", "q1"), ("reference", "q1d"), ("command", "U")]
+    shown = [(owner, f"{quantity}_{joint}") for owner, quantity in columns for joint in joints]
+    digits = "9" if interface.export.real == "float" else "17"
+    return {
+        "digits": digits,
+        "csv_header": ",".join(["t", *(name for _, name in shown)]),
+        "print_fields": "\n".join(f'  printf(",%.{digits}g", (double){owner}->{name});' for owner, name in shown),
+        "measure": "\n".join(
+            f"    measurement.{field.name} = state.{field.name};" for field in interface.structures["measurement"]
+        ),
+    }
+
+
+def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
+    single, structures = export.real == "float", interface.structures
+    n = export.system.n
+
+    def filled(*names: str) -> str:
+        members = [(name, field.name) for name in names for field in structures[name]]
+        places = [f"{'base[0]' if name == 'base' else name}.{field}" for name, field in members]
+        return "\n".join(f"  {place} = in[{k}];" for k, place in enumerate(places))
+
+    def taken(places: list[str]) -> str:
+        return "\n".join(f"  got[{k}] = {place};" for k, place in enumerate(places))
+
+    outputs = [
+        f"{quantity}_{joint.name}" for quantity in ("U", "U_s", "U_f", "e", "sigma") for joint in export.system.joints
+    ]
+    states = [field.name for field in structures["state"]]
+    measured = [field.name for field in structures["measurement"]]
+    tunable = export.tunable_slots
+    call = [f"  {export.real} x[{len(states)}] = {{{literal(0.0, export.real)}}};"]
+    if tunable:
+        members = [f"springline_default_config.parameters.{slot.symbol}" for slot in tunable]
+        call += [f"  {export.real} p[{len(tunable)}];"]
+    pointers = [f"in + {k * n}" for k in range(3)] + ["x"] + (["p"] if tunable else [])
+    call += [
+        f"  const {export.real} *arg[{len(pointers)}] = {{0}};",
+        f"  {export.real} *res[5] = {{0}};",
+        *(f"  x[{states.index(name)}] = in[{3 * n + k}];" for k, name in enumerate(measured)),
+        *((f"  p[{k}] = {member};" for k, member in enumerate(members)) if tunable else ()),
+        *(f"  arg[{k}] = {pointer};" for k, pointer in enumerate(pointers)),
+        *(f"  res[{k}] = got + {k * n};" for k in range(5)),
+        "  if (springline_control(arg, res, 0, 0, 0) != 0) return 1;",
+    ]
+    return {
+        "bits": "32" if single else "64",
+        "bits_type": "uint32_t" if single else "uint64_t",
+        "strto": "strtof" if single else "strtod",
+        "control_in": str(3 * n + len(measured)),
+        "control_out": str(len(outputs)),
+        "control_output_names": ", ".join(f'"{name}"' for name in outputs),
+        "plant_in": str(len(structures["base"]) + len(states) + n),
+        "plant_out": str(len(states)),
+        "plant_output_names": ", ".join(f'"{name}"' for name in states),
+        "plant_time_step": literal(TIME_STEP, export.real),
+        "control_from_vector": filled("reference", "measurement"),
+        "control_to_vector": taken(
+            [
+                f"command.{name}" if name.startswith("U_") and k < n else f"diagnostics.{name}"
+                for k, name in enumerate(outputs)
+            ]
+        ),
+        "model_call": "\n".join(call),
+        "plant_from_vector": filled("base", "state", "command"),
+        "plant_to_vector": taken([f"state.{name}" for name in states]),
+    }
+
+
+def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
+    tunable = set(export.tunable)
+    single = export.real == "float"
+    cost = {"springline_step": "control", "one evaluation of the plant, of four in springline_plant_step": "plant"}
+    return {
+        "provenance": "  \n".join(provenance(export)),
+        "field_table": "\n".join(
+            f"| `springline_{name}` | `{field.name}` | {field.unit} |"
+            for name, members in interface.structures.items()
+            for field in members
+        ),
+        "status_table": "\n".join(
+            f"| `SPRINGLINE_{name}` | {value} | {text} |" for value, (name, text) in enumerate(STATUS)
+        ),
+        "parameters_text": "The tunable ones are set through `springline_config`, checked by `springline_init`."
+        if tunable
+        else "All are constants of the C.",
+        "parameter_table": "\n".join(
+            f"| `{slot.key}` | {value!r} | {slot.unit} | {'run' if i in tunable else 'baked'} |"
+            for i, (slot, value) in enumerate(zip(export.slots, export.values, strict=True))
+        ),
+        "cost_table": "\n".join(
+            f"| {name} | {interface.bodies[body].operations} | {interface.bodies[body].live} |"
+            for name, body in cost.items()
+        ),
+        "control_stack": str(interface.stack("control")),
+        "plant_stack": str(interface.stack("plant")),
+        "model_origin": "printed like the rest in single precision, with CasADi's calling convention"
+        if single
+        else "as CasADi prints them: `casadi.external` can load them from a shared library",
+        "math_files": "`src/sl_mathf.h`" if single else "`src/sl_math.h`, `src/sl_casadi.h`",
+    }

@@ -1,0 +1,96 @@
+#ifndef SPRINGLINE_H
+#define SPRINGLINE_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef {{real}} springline_real;
+
+/* What every function returns; springline_status_text says what to do about it. */
+enum {
+{{status_enum}}
+};
+
+/* What springline_step commands when it returns anything but SPRINGLINE_OK. */
+enum {
+  SPRINGLINE_FALLBACK_ZERO = 0, /* zero force */
+  SPRINGLINE_FALLBACK_LAST = 1  /* the last command that was computed without fault, zero before the first */
+};
+
+/* Where the arm should be: joint coordinates q1d, their rates dq1d and accelerations ddq1d. */
+typedef struct springline_reference {
+{{reference_fields}}
+} springline_reference;
+
+/* Where the arm is: joint coordinates q1 and rates dq1, motor rates dq2 (reflected to the joint). */
+typedef struct springline_measurement {
+{{measurement_fields}}
+} springline_measurement;
+
+/* What the motors should do. */
+typedef struct springline_command {
+{{command_fields}}
+} springline_command;
+
+/* Why: tracking error e, sliding variable sigma, the two parts of U, and whether U_max has limited it (0 or 1). */
+typedef struct springline_diagnostics {
+{{diagnostics_fields}}
+} springline_diagnostics;
+
+/* The plant's state: joint coordinates q1, motor coordinates q2 (reflected to the joint), and their rates. */
+typedef struct springline_state {
+{{state_fields}}
+} springline_state;
+
+/* Motion of the base: shake y_r1, pitch theta_1z, roll theta_1x, their rates d_ and accelerations dd_. */
+typedef struct springline_base {
+{{base_fields}}
+} springline_base;
+
+{{parameter_struct}}typedef struct springline_config {
+  int fallback; /* SPRINGLINE_FALLBACK_ZERO or SPRINGLINE_FALLBACK_LAST */
+{{config_parameters}}} springline_config;
+
+/* {{default_config_meaning}} */
+extern const springline_config springline_default_config;
+
+/* A controller and all it needs. The caller owns it; only the functions below touch its fields. {{controller_bytes}} bytes. */
+typedef struct springline_controller {
+  springline_config config;
+{{controller_derived}}  springline_command last;
+  int ready;
+} springline_controller;
+
+/* Prepares a controller. If it fails the controller commands zero force. */
+int springline_init(springline_controller *controller, const springline_config *config);
+
+/*
+ * Computes the command for one sample. The law keeps no state from step to step, so any sample rate will do; for the
+ * default drive 1 kHz is enough. Whatever happens *command is set: to the fallback if the status is not SPRINGLINE_OK.
+ * diagnostics may be NULL; it is zero if the status is not SPRINGLINE_OK.
+ */
+int springline_step(springline_controller *controller, const springline_reference *reference,
+                    const springline_measurement *measurement, springline_command *command,
+                    springline_diagnostics *diagnostics);
+
+/* The plant, for tests and hardware in the loop: state after `step` seconds (classical Runge-Kutta, one step; take 1e-4)
+ * under a constant command. base[0], base[1], base[2] are the base's motion at the start, the middle and the end of the
+ * step; base = NULL for a base at rest. If it fails *state is left as it was. */
+int springline_plant_step(const springline_controller *controller, springline_state *state,
+                          const springline_command *command, const springline_base *base, springline_real step);
+
+/* The plant's initial state. */
+int springline_start(const springline_controller *controller, springline_state *state);
+
+/* {{signals_meaning}} */
+int springline_signals(const springline_controller *controller, springline_real t, springline_reference *reference,
+                       springline_base *base);
+
+/* What a status means and what to do about it, one English sentence; never NULL. */
+const char *springline_status_text(int status);
+
+#ifdef __cplusplus
+}
+#endif
+#endif /* SPRINGLINE_H */

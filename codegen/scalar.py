@@ -1,0 +1,296 @@
+"""An export's functions as plain scalar C, double or float, printed from the value graph of the frozen Functions.
+
+What CasADi's C computes, to the last bit (in double): equal values are computed once, what depends on parameters only
+is computed when they are set, sin and cos of one angle become one call. The statements stay in the order of the frozen
+lists, which keeps few values alive at a time: on a small processor that is what counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from springline.codegen.export import Export, Real, port_entries
+from springline.codegen.graph import Binding, Graph
+from springline.codegen.lanes import SPECIAL_POWERS, UnprintableOperation
+from springline.model.sliding import LARGEST_EXPONENT, TINY
+
+_INFIX = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
+_COMPARISONS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
+_LOGIC = {ca.OP_AND: "&", ca.OP_OR: "|"}
+_MASKS = frozenset({*_COMPARISONS, *_LOGIC, ca.OP_NOT})
+_CALLS = {
+    ca.OP_SQRT: "sqrt",
+    ca.OP_EXP: "exp",
+    ca.OP_EXPM1: "expm1",
+    ca.OP_LOG: "log",
+    ca.OP_LOG1P: "log1p",
+    ca.OP_SIN: "sin",
+    ca.OP_COS: "cos",
+    ca.OP_TAN: "tan",
+    ca.OP_POW: "pow",
+    ca.OP_CONSTPOW: "pow",
+    ca.OP_HYPOT: "hypot",
+    ca.OP_FABS: "fabs",
+    ca.OP_SIGN: "sign",
+    ca.OP_FMIN: "fmin",
+    ca.OP_FMAX: "fmax",
+    ca.OP_FLOOR: "floor",
+    ca.OP_CEIL: "ceil",
+    ca.OP_COPYSIGN: "copysign",
+}
+_NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
+
+# Guards of the model that a float cannot hold, and what does their duty there: TINY_FLOAT**(-4/3), the steepest power
+# on the control's way, and exp(LARGEST_EXPONENT_FLOAT) times a gain of 20 are still finite.
+_SINGLE = {TINY: 1e-24, LARGEST_EXPONENT: 85.0}
+
+
+def literal(value: float, real: Real) -> str:
+    """The C constant: the same double, or the float nearest to it.
+
+    Raises ValueError for a number other than zero that a float cannot hold.
+    """
+    f = "F" if real == "float" else ""
+    if math.isnan(value):
+        return f"SL{f}_NAN"
+    if math.isinf(value):
+        return f"SL{f}_INF" if value > 0 else f"-SL{f}_INF"
+    if real == "double":
+        return _with_point(repr(value))
+    value = math.copysign(_SINGLE.get(abs(value), abs(value)), value)
+    with np.errstate(over="ignore", under="ignore"):
+        single = np.float32(value)
+    if value != 0.0 and (single == 0.0 or not np.isfinite(single)):
+        raise ValueError(f"the constant {value!r} of the model cannot be a float: export with real = 'double'")
+    return _with_point(np.format_float_scientific(single, trim="-") if _extreme(value) else str(single)) + "f"
+
+
+def _extreme(value: float) -> bool:
+    return value != 0.0 and not 1e-4 <= abs(value) < 1e7
+
+
+def _with_point(text: str) -> str:
+    return text if any(c in text for c in ".e") else text + ".0"
+
+
+class _Values(Graph):
+    """Value graph of an export: references, measurements, base motion and commands come from outside.
+
+    Graph's own constructor lays out the simulation loop, where they are computed.
+    """
+
+    def __init__(self, export: Export) -> None:
+        self.nodes, self.outputs, self._index = [], {}, {}
+        self.tunable = tuple(slot.key for slot in export.tunable_slots)
+        column = {slot: k for k, slot in enumerate(export.tunable)}
+        self._known = {
+            "p": [
+                self._leaf("p", column[i], Binding.RUN, True) if i in column else self.constant(value)
+                for i, value in enumerate(export.values)
+            ],
+            "d": [self.constant(0.0)] * export.system.d.numel(),  # tables are not part of an export
+        }
+
+    def apply(self, function: ca.Function) -> list[int]:
+        """Add a Function whose inputs are leaves of their own names; the nodes of all its outputs' entries."""
+        names = [function.name_in(i) for i in range(function.n_in())]
+        inputs = [
+            self._known[name]
+            if name in self._known
+            else [self._leaf(name, k, Binding.STATE) for k in range(function.numel_in(i))]
+            for i, name in enumerate(names)
+        ]
+        return [i for output in self.add(function.name(), function, inputs) for i in output]
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Statements of a function and what they cost.
+
+    operations  arithmetic operations and calls of elementary functions
+    live        most values that are alive at once
+    """
+
+    lines: tuple[str, ...]
+    operations: int
+    live: int
+
+
+class ScalarPrinter:
+    """Prints Functions of an export as C statements; they share one value graph.
+
+    functions  Functions of the System, each input named for what it is ("x", "q1d", …); p and d are the System's
+    hoist      values that depend on parameters only are not computed by the functions but by `derive`
+    """
+
+    def __init__(self, export: Export, functions: Sequence[ca.Function], *, hoist: bool) -> None:
+        self._real: Real = export.real
+        self._math = "slf" if export.real == "float" else "sl"
+        self._hoist = hoist
+        self._graph = _Values(export)
+        self._wanted = {function.name(): self._graph.apply(function) for function in functions}
+        self._labels = {
+            function.name(): [label for port in export.outputs(function) for label in port.labels]
+            for function in functions
+        }
+        entries = port_entries(export.system)
+        self._names = {}
+        for i, node in enumerate(self._graph.nodes):
+            source, k = node.source
+            if node.op is None and node.binding is not Binding.CONSTANT:
+                is_p = source == "p"
+                self._names[i] = export.tunable_slots[k].symbol if is_p else entries[source][k][0]
+        self._derived: dict[int, int] = {}
+        if hoist:
+            for wanted in self._wanted.values():
+                for i in self._given(wanted):
+                    node = self._graph.nodes[i]
+                    if node.op is not None:
+                        self._derived.setdefault(i, len(self._derived))
+
+    @property
+    def derived(self) -> int:
+        """How many values depend on parameters only, are no constants, and are needed by a function."""
+        return len(self._derived)
+
+    def reads(self, name: str) -> frozenset[tuple[str, int]]:
+        """The inputs (name, entry) that Function `name` reads."""
+        sources = (self._graph.nodes[i].source for i in self._given(self._wanted[name]))
+        return frozenset(source for source in sources if source[0])
+
+    def body(self, name: str, load: Callable[[str, int], str], targets: Sequence[str]) -> Body:
+        """Function `name`; load(input, entry) is the C of an input ("derived" is one), targets take the outputs."""
+        wanted = self._wanted[name]
+        return self._body(wanted, self._needed(wanted), load, targets, self._labels[name])
+
+    def derive(self, load: Callable[[str, int], str], target: str) -> Body:
+        """What `functions` expect under target[0], target[1], …"""
+        wanted = list(self._derived)
+        needed = self._graph.needed(wanted, Binding.RUN)
+        targets = [f"{target}[{k}]" for k in range(len(wanted))]
+        return self._body(wanted, needed, load, targets, [f"r{k}" for k in range(len(wanted))], deriving=True)
+
+    def _needed(self, wanted: Sequence[int]) -> list[int]:
+        found = self._graph.needed(wanted, Binding.STATE)
+        if self._hoist:
+            return found
+        arguments = [a for i in found for a in self._graph.nodes[i].arguments]
+        return sorted({*found, *self._graph.needed([*wanted, *arguments], Binding.RUN)})
+
+    def _given(self, wanted: Sequence[int]) -> list[int]:
+        """Values that come from outside when `wanted` is computed."""
+        needed = self._needed(wanted)
+        used = {*wanted, *(a for i in needed for a in self._graph.nodes[i].arguments)} - set(needed)
+        return sorted(i for i in used if self._graph.nodes[i].binding is not Binding.CONSTANT)
+
+    def _body(
+        self,
+        wanted: Sequence[int],
+        needed: Sequence[int],
+        load: Callable[[str, int], str],
+        targets: Sequence[str],
+        labels: Sequence[str],
+        *,
+        deriving: bool = False,
+    ) -> Body:
+        nodes = self._graph.nodes
+        lines: list[str] = []
+        ready: set[int] = set()
+        names = self._named(wanted, needed, labels)
+        pairs = {(nodes[i].op, nodes[i].arguments[0]): i for i in needed if nodes[i].op in (ca.OP_SIN, ca.OP_COS)}
+
+        def value(i: int) -> str:
+            node = nodes[i]
+            if node.binding is Binding.CONSTANT:
+                return literal(node.value, self._real)
+            if i not in ready:
+                ready.add(i)
+                derived = not deriving and i in self._derived
+                given = load("derived", self._derived[i]) if derived else load(*node.source)
+                if given != names[i]:
+                    lines.append(f"const {self._real} {names[i]} = {given};")
+            return f"{self._math}_true({names[i]})" if node.op in _MASKS else names[i]
+
+        def truth(i: int) -> str:
+            text = value(i)
+            return names[i] if nodes[i].op in _MASKS else f"({text} != {literal(0.0, self._real)})"
+
+        for i in needed:
+            node = nodes[i]
+            if i in ready:
+                continue
+            if node.op in (ca.OP_SIN, ca.OP_COS) and len({(op, a) for op, a in pairs if a == node.arguments[0]}) == 2:
+                sine, cosine = pairs[ca.OP_SIN, node.arguments[0]], pairs[ca.OP_COS, node.arguments[0]]
+                argument = value(node.arguments[0])
+                lines.append(f"{self._real} {names[sine]}, {names[cosine]};")
+                lines.append(f"{self._math}_sincos({argument}, &{names[sine]}, &{names[cosine]});")
+                ready |= {sine, cosine}
+                continue
+            text = self._expression(i, value, truth)
+            kind = "int" if node.op in _MASKS else self._real
+            lines.append(f"const {kind} {names[i]} = {text};")
+            ready.add(i)
+        values = [value(i) for i in wanted]
+        lines += [f"{target} = {text};" for target, text in zip(targets, values, strict=True)]
+        return Body(tuple(lines), len(needed), self._live(wanted, needed))
+
+    def _named(self, wanted: Sequence[int], needed: Sequence[int], labels: Sequence[str]) -> dict[int, str]:
+        """What each value is called: by the model where it has a word for it, else a0, a1, … in order."""
+        nodes = self._graph.nodes
+        names = dict(self._names) | {i: f"r{k}" for i, k in self._derived.items()}
+        for i, label in zip(wanted, labels, strict=True):
+            names.setdefault(i, label)
+        for position, i in enumerate(needed):
+            if nodes[i].op in (ca.OP_SIN, ca.OP_COS) and nodes[i].arguments[0] in self._names:
+                function = "sin" if nodes[i].op == ca.OP_SIN else "cos"
+                names.setdefault(i, f"{function}_{names[nodes[i].arguments[0]]}")
+            names.setdefault(i, f"a{position}")
+        return names
+
+    def _live(self, wanted: Sequence[int], needed: Sequence[int]) -> int:
+        """Most values alive at once when each is computed in order and outputs are kept to the end."""
+        last = {a: position for position, i in enumerate(needed) for a in self._graph.nodes[i].arguments}
+        last |= dict.fromkeys(wanted, len(needed))
+        alive: set[int] = set()
+        most = 0
+        for position, i in enumerate(needed):
+            alive |= {i, *(a for a in self._graph.nodes[i].arguments if self._graph.nodes[a].op is not None)}
+            most = max(most, len(alive))
+            alive = {k for k in alive if last.get(k, -1) > position}
+        return most
+
+    def _expression(self, i: int, value: Callable[[int], str], truth: Callable[[int], str]) -> str:
+        node = self._graph.nodes[i]
+        op, arguments = node.op, node.arguments
+        assert op is not None
+        if op in _LOGIC:
+            return f"{truth(arguments[0])} {_LOGIC[op]} {truth(arguments[1])}"
+        if op == ca.OP_NOT:
+            return f"!{truth(arguments[0])}"
+        if op == ca.OP_IF_ELSE_ZERO:
+            return f"{self._math}_if({truth(arguments[0])}, {value(arguments[1])})"
+        operands = [value(a) for a in arguments]
+        if op in _INFIX or op in _COMPARISONS:
+            return f" {(_INFIX | _COMPARISONS)[op]} ".join(operands)
+        if op == ca.OP_NEG:
+            return f"-{operands[0]}"
+        if op == ca.OP_SQ:
+            return f"{operands[0]} * {operands[0]}"
+        if op == ca.OP_TWICE:
+            return f"{literal(2.0, self._real)} * {operands[0]}"
+        if op == ca.OP_INV:
+            return f"{literal(1.0, self._real)} / {operands[0]}"
+        if op in (ca.OP_POW, ca.OP_CONSTPOW):
+            exponent = self._graph.nodes[arguments[1]]
+            if exponent.binding is Binding.CONSTANT and exponent.value in SPECIAL_POWERS:
+                return f"{self._math}_pow_{SPECIAL_POWERS[exponent.value]}({operands[0]})"
+        if op in _CALLS:
+            return f"{self._math}_{_CALLS[op]}({', '.join(operands)})"
+        raise UnprintableOperation(
+            f"operation {_NAMES.get(op, op)} cannot be exported; sl_math.h has no function for it"
+        )

@@ -1,0 +1,274 @@
+"""The typed C interface of an export: what its structures hold and how its functions compute."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from springline.codegen.export import Export, Real, port_entries
+from springline.codegen.scalar import Body, ScalarPrinter, literal
+from springline.model.parameters import Bounds
+
+STATUS = (
+    ("OK", "done"),
+    ("NULL_ARGUMENT", "a pointer was NULL that may not be: pass the structures that springline.h names"),
+    ("NOT_INITIALIZED", "the controller is not ready: call springline_init first and check what it returns"),
+    ("BAD_FALLBACK", "config.fallback is neither SPRINGLINE_FALLBACK_ZERO nor SPRINGLINE_FALLBACK_LAST: set it"),
+    ("BAD_PARAMETER", "a parameter is out of its range (springline.h): correct it and call springline_init again"),
+    ("BAD_REFERENCE", "a reference is not a finite number: check the trajectory generator; the fallback is commanded"),
+    ("BAD_MEASUREMENT", "a measurement is not a finite number: check the sensors; the fallback is commanded"),
+    ("OVERFLOW", "the law left the finite numbers: set a_max or check the reference; the fallback is commanded"),
+    ("BAD_PLANT_INPUT", "state, command, base motion or step not finite, or step not positive: the state was kept"),
+    ("DIVERGED", "the plant left the finite numbers: take a smaller step or check the commands; the state was kept"),
+    ("BAD_TIME", "the time is not a finite number: correct it"),
+)
+"""Statuses in the order of their values: name, and what happened and what to do about it."""
+
+_MATH_STACK = 160  # bytes below the deepest elementary function, as measured on Cortex-M7
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A member of a structure: its name, its unit, and "integer" or "real"."""
+
+    name: str
+    unit: str
+    integer: bool = False
+
+
+class TypedInterface:
+    """Structures and function bodies of an export's C interface."""
+
+    def __init__(self, export: Export) -> None:
+        self.export = export
+        system = export.system
+        entries = port_entries(system)
+        names = ("control", "plant", "start", "signals")
+        self._printer = ScalarPrinter(export, [system.function(name) for name in names], hoist=True)
+        read = self._printer.reads("control")
+
+        def fields(*ports: str) -> tuple[Field, ...]:
+            return tuple(Field(label, unit) for port in ports for label, unit in entries[port])
+
+        def per_joint(*quantities: tuple[str, str]) -> tuple[Field, ...]:
+            return tuple(
+                Field(f"{quantity}_{joint.name}", unit.format(q=joint.unit, F=joint.force))
+                for quantity, unit in quantities
+                for joint in system.joints
+            )
+
+        saturated = tuple(Field(f"saturated_{joint.name}", "0 or 1", integer=True) for joint in system.joints)
+        self.structures: dict[str, tuple[Field, ...]] = {
+            "reference": fields("q1d", "dq1d", "ddq1d"),
+            "measurement": tuple(field for k, field in enumerate(fields("x")) if ("x", k) in read),
+            "command": per_joint(("U", "{F}")),
+            "diagnostics": (*per_joint(("e", "{q}"), ("sigma", "{q}/s"), ("U_s", "{F}"), ("U_f", "{F}")), *saturated),
+            "state": fields("x"),
+            "base": fields("b", "db", "ddb"),
+        }
+        if export.tunable:
+            self.structures["parameters"] = tuple(Field(slot.symbol, slot.unit) for slot in export.tunable_slots)
+        self.derived = self._printer.derived
+
+        state, base = self.structures["state"], self.structures["base"]
+        reference, command = self.structures["reference"], self.structures["command"]
+        signals = [f"reference->{f.name}" for f in reference] + [f"base->{f.name}" for f in base]
+        parts = self.structures["diagnostics"][: 4 * system.n]
+        e, sigma, slow, fast = (parts[k * system.n : (k + 1) * system.n] for k in range(4))
+        seen = [f"diagnostics->{f.name}" for f in (*slow, *fast, *e, *sigma)]
+        self.bodies: dict[str, Body] = {
+            "control": self._printer.body(
+                "control",
+                self._load({"q1d": "reference->", "dq1d": "reference->", "ddq1d": "reference->", "x": "measurement->"}),
+                [*(f"command->{f.name}" for f in command), *seen],
+            ),
+            "plant": self._printer.body(
+                "plant",
+                self._load({"b": "base->", "db": "base->", "ddb": "base->", "u": "command->"}, x_is_array=True),
+                [f"dx[{k}]" for k in range(len(state))],
+            ),
+            "start": self._printer.body("start", self._load({}), [f"state->{f.name}" for f in state]),
+            "signals": self._printer.body("signals", self._load({"t": ""}), signals),
+        }
+
+    def _load(self, owners: dict[str, str], *, x_is_array: bool = False) -> Callable[[str, int], str]:
+        """C of the inputs: members of the structures they come in."""
+        entries = port_entries(self.export.system)
+        symbols = [slot.symbol for slot in self.export.tunable_slots]
+
+        def load(name: str, k: int) -> str:
+            if name == "derived":
+                return f"controller->derived[{k}]"
+            if name == "p":
+                return f"controller->config.parameters.{symbols[k]}"
+            if name == "x" and x_is_array:
+                return f"x[{k}]"
+            label = entries[name][k][0]
+            return owners[name] + (label.replace("u_", "U_", 1) if name == "u" else label)
+
+        return load
+
+    @property
+    def derive(self) -> Body:
+        """What springline_init computes from the parameters."""
+        symbols = [slot.symbol for slot in self.export.tunable_slots]
+        return self._printer.derive(lambda _, k: f"parameters->{symbols[k]}", "derived")
+
+    def bytes_of(self, name: str) -> int:
+        """sizeof of a structure, or of springline_controller."""
+        real = 8 if self.export.real == "double" else 4
+        if name != "controller":
+            members = self.structures[name]
+            integers = sum(field.integer for field in members)
+            return _padded(real * (len(members) - integers) + 4 * integers, real)
+        config = real if "parameters" in self.structures else 4  # the fallback, padded before numbers
+        config += real * len(self.structures.get("parameters", ()))
+        return _padded(_padded(config, real) + real * self.derived + self.bytes_of("command") + 4, real)
+
+    def stack(self, name: str) -> int:
+        """Estimated bytes of stack of springline_step ("control") or springline_plant_step ("plant")."""
+        real = 8 if self.export.real == "double" else 4
+        local = (
+            self.bytes_of("command") + self.bytes_of("diagnostics") if name == "control" else 4 * self.bytes_of("state")
+        )
+        return _padded(real * self.bodies[name].live + local + _MATH_STACK, 16)
+
+    # -- blocks of the templates --------------------------------------------------------------------------------
+
+    def blocks(self) -> dict[str, str]:
+        """Text for the placeholders of springline.h and springline.c."""
+        export, real = self.export, self.export.real
+        system = export.system
+        blocks = {f"{name}_fields": self._fields(name) for name in self.structures if name != "parameters"}
+        blocks |= {
+            f"{name}_is_finite": _all(f"finite({name}->{field.name})" for field in self.structures[name])
+            for name in ("reference", "measurement", "command", "base")
+        }
+        diagnostics = self.structures["diagnostics"]
+        sums = [f"diagnostics->U_s_{j.name} + diagnostics->U_f_{j.name}" for j in system.joints]
+        values = [f"diagnostics->{field.name}" for field in diagnostics if not field.integer]
+        flags = [
+            f"  diagnostics->saturated_{j.name} = command->U_{j.name} < {total} || command->U_{j.name} > {total};"
+            for j, total in zip(system.joints, sums, strict=True)
+        ]
+        state = self.structures["state"]
+        blocks |= {
+            "status_enum": ",\n".join(f"  SPRINGLINE_{name} = {value}" for value, (name, _) in enumerate(STATUS)),
+            "status_cases": "\n".join(f'    case SPRINGLINE_{name}: return "{text}";' for name, text in STATUS),
+            "zero_command": self._zeros("command"),
+            "zero_diagnostics": self._zeros("diagnostics"),
+            "zero_base": self._zeros("base"),
+            "control_is_finite": _all(f"finite({value})" for value in (*values, *sums)),
+            "control": "\n".join(["  (void)controller;", *self._lines("control"), *flags]),
+            "plant": "\n".join(["  (void)controller, (void)base;", *self._lines("plant")]),
+            "start": "\n".join(self._lines("start")),
+            "signals": "\n".join(f"  {line}" for line in self._lines("signals")),
+            "state_to_x": "\n".join(f"  x[{k}] = state->{field.name};" for k, field in enumerate(state)),
+            "next_to_state": "\n".join(f"  state->{field.name} = next[{k}];" for k, field in enumerate(state)),
+            "states": str(len(state)),
+            "control_operations": str(self.bodies["control"].operations),
+            "plant_operations": str(self.bodies["plant"].operations),
+            "signals_meaning": self._signals_meaning(),
+            "controller_bytes": str(self.bytes_of("controller")),
+        }
+        derived, tunable = self.derived, export.tunable_slots
+        derive = [f"  {line}" for line in self.derive.lines]
+        signature = "static void derive(const springline_parameters *parameters, real *derived) {\n"
+        if not tunable:
+            signature = "static void derive(real *derived) {\n"
+        argument = "&config->parameters, " if tunable else ""
+        defaults = ", ".join(literal_constant(export.values[i], real) for i in export.tunable)
+        blocks |= {
+            "parameter_struct": self._parameter_struct(),
+            "config_parameters": "  springline_parameters parameters;\n" if tunable else "",
+            "controller_derived": f"  springline_real derived[{derived}]; /* from the parameters */\n"
+            if derived
+            else "",
+            "default_config_meaning": "Zero force as fallback" + (", the exported parameters." if tunable else "."),
+            "default_config": "{SPRINGLINE_FALLBACK_ZERO" + (f", {{{defaults}}}" if tunable else "") + "}",
+            "derive": "\n".join(["/* What depends on parameters only. */", signature + "\n".join(derive), "}", "", ""])
+            if derived
+            else "",
+            "init_derived": f"  derive({argument}controller->derived);\n" if derived else "",
+            "parameters_check": self._parameters_check(),
+            "init_parameters": "  if (!parameters_are_good(&config->parameters)) return SPRINGLINE_BAD_PARAMETER;\n"
+            if tunable
+            else "",
+        }
+        return blocks
+
+    def _lines(self, name: str) -> list[str]:
+        return [f"  {line}" for line in self.bodies[name].lines]
+
+    def _fields(self, name: str) -> str:
+        members = self.structures[name]
+        width = max(len(field.name) for field in members) + 1
+        return "\n".join(
+            f"  {'int' if field.integer else 'springline_real'} {field.name + ';':{width}} /* {field.unit} */"
+            for field in members
+        )
+
+    def _zeros(self, name: str) -> str:
+        zero = literal(0.0, self.export.real)
+        return "{" + ", ".join("0" if field.integer else zero for field in self.structures[name]) + "}"
+
+    def _parameter_struct(self) -> str:
+        slots = self.export.tunable_slots
+        if not slots:
+            return ""
+        width = max(len(slot.symbol) for slot in slots) + 1
+        lines = [
+            f"  springline_real {slot.symbol + ';':{width}} /* {slot.unit}; {slot.meaning}; {slot.bounds} */"
+            for slot in slots
+        ]
+        body = "\n".join(lines)
+        opening = "/* Numbers that may be set. */\ntypedef struct springline_parameters {"
+        return f"{opening}\n{body}\n}} springline_parameters;\n\n"
+
+    def _parameters_check(self) -> str:
+        slots = self.export.tunable_slots
+        if not slots:
+            return ""
+        tests = [text for s in slots for text in bounds_tests(f"p->{s.symbol}", s.bounds, self.export.real)]
+        return f"static int parameters_are_good(const springline_parameters *p) {{\n  return {_all(tests)};\n}}\n\n"
+
+    def _signals_meaning(self) -> str:
+        structure = self.export.system.structure
+        text = "Reference and base motion of the exported scenario at time t, s."
+        tables = [
+            n
+            for n, s in (("reference", structure.reference), ("base motion", structure.base_motion))
+            if s.kind == "table"
+        ]
+        if tables:
+            text += f" Its {' and '.join(tables)} table is not part of the export: zero here."
+        return text
+
+
+def literal_constant(value: float, real: Real) -> str:
+    """As `literal`, for initialisers of static data, where C wants a constant expression."""
+    if math.isinf(value):
+        return f"{literal(math.copysign(1.0, value), real)} / {literal(0.0, real)}"
+    return literal(value, real)
+
+
+def bounds_tests(expression: str, bounds: Bounds, real: Real) -> list[str]:
+    """C conditions that hold if and only if the value is admissible; NaN never is."""
+    tests = [] if bounds.infinite else [f"finite({expression})"]
+    if not math.isinf(bounds.low):
+        tests.append(f"{expression} {'>' if bounds.low_open else '>='} {literal(bounds.low, real)}")
+    if not math.isinf(bounds.high):
+        tests.append(f"{expression} {'<' if bounds.high_open else '<='} {literal(bounds.high, real)}")
+    if bounds.even:
+        half = f"{literal(0.5, real)} * {expression}"
+        tests.append(f"{'slf' if real == 'float' else 'sl'}_floor({half}) >= {half}")
+    return tests
+
+
+def _all(tests: Iterable[str]) -> str:
+    return " &&\n         ".join(tests)
+
+
+def _padded(size: int, alignment: int) -> int:
+    return -(-size // alignment) * alignment

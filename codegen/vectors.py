@@ -1,0 +1,146 @@
+"""test_vectors.txt: inputs and the outputs that every build of an export must give, to the last bit.
+
+The outputs come from the model's functions, compiled here, and a Runge-Kutta step in NumPy, so the typed interface that
+replays them is checked against code that is not its own.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springline.codegen import toolchain
+from springline.codegen.export import Export, provenance
+from springline.codegen.typed import TypedInterface
+
+CONTROL_VECTORS = 1000
+PLANT_VECTORS = 200
+TIME_STEP = 1e-4
+"""Step of the plant vectors, s."""
+
+Numbers = NDArray[Any]  # float64 or float32
+
+
+class _Model:
+    """The compiled functions of the model."""
+
+    def __init__(self, export: Export, sources: Mapping[str, bytes]) -> None:
+        flat = {PurePosixPath(path).name: content for path, content in sources.items()}
+        library = toolchain.build_library(flat, main=f"{export.prefix}_model.c", flags=("-O1",))
+        self._handle = toolchain.load(library)
+        self._export = export
+        self.dtype = np.float64 if export.real == "double" else np.float32
+        self._p = np.array([export.values[i] for i in export.tunable], self.dtype)
+
+    def __call__(self, name: str, *inputs: Numbers) -> list[Numbers]:
+        """The outputs of function `name` with the exported parameters."""
+        function = self._export.system.function(name)
+        arrays = [np.ascontiguousarray(x, self.dtype) for x in inputs] + ([self._p] if len(self._p) else [])
+        results = [np.zeros(function.numel_out(i), self.dtype) for i in range(function.n_out())]
+        arguments, outputs = (
+            (ctypes.c_void_p * len(part))(*(x.ctypes.data for x in part)) for part in (arrays, results)
+        )
+        self._handle[f"{self._export.prefix}_{name}"](arguments, outputs, None, None, 0)
+        return results
+
+
+def test_vectors(export: Export, interface: TypedInterface, sources: Mapping[str, bytes]) -> bytes:
+    """The file. sources: the model's C files and what they include, by path. Raises ToolchainError."""
+    model = _Model(export, sources)
+    names = {name: " ".join(field.name for field in fields) for name, fields in interface.structures.items()}
+    lines = [
+        *provenance(export),
+        f"control: {names['reference']} {names['measurement']}",
+        f"      -> {' '.join(control_outputs(export))}",
+        f"plant (a step of {TIME_STEP!r} s, base motion constant): {names['base']} {names['state']} {names['command']}",
+        f"      -> {names['state']}",
+    ]
+    rows = [f"control {_hex(row)}" for row in _control_rows(interface, model)]
+    rows += [f"plant {_hex(row)}" for row in _plant_rows(interface, model)]
+    return "".join([*(f"# {line}\n" for line in lines), *(f"{row}\n" for row in rows)]).encode()
+
+
+def control_outputs(export: Export) -> list[str]:
+    """What a control vector's outputs are called, in order."""
+    quantities = ("U", "U_s", "U_f", "e", "sigma")
+    return [f"{quantity}_{joint.name}" for quantity in quantities for joint in export.system.joints]
+
+
+def _hex(numbers: Sequence[float]) -> str:
+    """Hexadecimal floats without the zeros at their end."""
+    words = []
+    for number in numbers:
+        significand, exponent = float(number).hex().split("p")
+        words.append(f"{significand.rstrip('0').rstrip('.') if '.' in significand else significand}p{exponent}")
+    return " ".join(words)
+
+
+class _Draw:
+    """Short pseudo-random numbers, the same everywhere."""
+
+    def __init__(self) -> None:
+        self._random = random.Random(474)  # noqa: S311 - no secret
+
+    def uniform(self, bound: float, count: int) -> list[float]:
+        """In steps of bound/1024 between -bound and bound."""
+        return [bound * self._random.randint(-1024, 1024) / 1024 for _ in range(count)]
+
+    def small(self, largest: int, count: int) -> list[float]:
+        """Of all sizes from 2^(largest-20) to 2^largest, one in ten zero."""
+        return [
+            0.0
+            if self._random.random() < 0.1
+            else self._random.choice((-1, 1)) * 2.0 ** self._random.randint(largest - 20, largest)
+            for _ in range(count)
+        ]
+
+
+def _control_rows(interface: TypedInterface, model: _Model) -> Iterator[list[float]]:
+    system = interface.export.system
+    n, draw = system.n, _Draw()
+    names = {field.name for field in interface.structures["measurement"]}
+    measured = [k for k, field in enumerate(interface.structures["state"]) if field.name in names]
+    for _ in range(CONTROL_VECTORS):
+        q1d, dq1d, ddq1d = draw.uniform(2.0, n), draw.uniform(4.0, n), draw.uniform(8.0, n)
+        error, rate = draw.small(1, n), draw.small(2, n)
+        q1 = [a - b for a, b in zip(q1d, error, strict=True)]
+        dq1 = [a - b for a, b in zip(dq1d, rate, strict=True)]
+        dq2 = [a + b for a, b in zip(dq1, draw.small(0, n), strict=True)]
+        reference = np.array([*q1d, *dq1d, *ddq1d], model.dtype)
+        x = np.array([*q1, *dq1, *q1, *dq2], model.dtype)
+        outputs = model("control", *np.split(reference, 3), x)
+        yield [*reference, *x[measured], *(value for part in outputs for value in part)]
+
+
+def _plant_rows(interface: TypedInterface, model: _Model) -> Iterator[list[float]]:
+    n, draw = interface.export.system.n, _Draw()
+    for _ in range(PLANT_VECTORS):
+        base = np.array([*draw.uniform(0.5, 3), *draw.uniform(1.0, 3), *draw.uniform(2.0, 3)], model.dtype)
+        q1 = draw.uniform(2.0, n)
+        stretch = [value / 1024 for value in draw.uniform(4.0, n)]
+        x = np.array(
+            [*q1, *draw.uniform(4.0, n), *(a + b for a, b in zip(q1, stretch, strict=True)), *draw.uniform(4.0, n)],
+            model.dtype,
+        )
+        u = np.array(draw.uniform(2048.0, n), model.dtype)
+        yield [*base, *x, *u, *_runge_kutta(model, base, x, u)]
+
+
+def _runge_kutta(model: _Model, base: Numbers, x: Numbers, u: Numbers) -> Numbers:
+    """One classical step, operation by operation as in loop.c."""
+    real = model.dtype
+    h = real(TIME_STEP)
+    motion = np.split(base, 3)
+    at, after = x, x
+    for weight, node in ((6, 0.5), (3, 0.5), (3, 1.0), (6, 0.0)):
+        [slope] = model("plant", *motion, at, u)
+        gain, advance = (real(1.0) / real(weight)) * h, real(node) * h
+        after = after + gain * slope
+        at = x + advance * slope
+    return after

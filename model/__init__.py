@@ -1,0 +1,1 @@
+"""Symbolic model: mechanism, moving base, series elastic drive, controller. CasADi expressions only."""

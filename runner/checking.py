@@ -1,0 +1,194 @@
+"""A scenario file checked as a whole: every table, then what the tables have to do with each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from springline.model.base import COORDINATES
+from springline.model.mechanisms import MECHANISMS
+from springline.model.parameters import POSITIVE
+from springline.model.system import Structure
+from springline.runner import schema
+from springline.runner.errors import InputError, Problem, unknown
+from springline.runner.locate import canonical_path, read_signal_file
+from springline.runner.tables import UNITS, Column, Ends, Table, read_table
+
+Document = dict[str, dict[str, Any]]
+Where = Callable[[str], str]
+
+# A time is a whole multiple of the step if it is off by no more than this of itself.
+_WHOLE = 1e-9
+
+
+def resolve(
+    raw: Mapping[str, object], source: str, folder: Path, overridden: Sequence[str] = ()
+) -> tuple[Document, tuple[Table, ...]]:
+    """A document with every default filled in, and its signal tables.
+
+    source      name of the file, for messages
+    folder      what relative paths refer to
+    overridden  keys whose values are not the file's
+    Raises InputError with all problems.
+    """
+
+    def where(key: str) -> str:
+        ours = any(key == item or key.startswith(f"{item}.") or item.startswith(f"{key}.") for item in overridden)
+        return f"override of {source}" if ours else source
+
+    problems = [unknown(where(key), key, "table", key, schema.TABLES) for key in raw if key not in schema.TABLES]
+    given: dict[str, dict[str, Any]] = {}
+    for name in schema.TABLES:
+        table = raw.get(name, {})
+        if isinstance(table, dict):
+            given[name] = table
+        else:
+            problems.append(Problem(where(name), name, "expected a table", schema.given_text(table)))
+            given[name] = {}
+    mechanism = given["mechanism"].get("name", Structure().mechanism)
+    if not isinstance(mechanism, str) or mechanism not in MECHANISMS:
+        key, name = "mechanism.name", mechanism if isinstance(mechanism, str) else ""
+        given_name = schema.given_text(mechanism)
+        problems.append(Problem(where(key), key, "unknown mechanism", given_name, name, tuple(MECHANISMS)))
+        raise InputError(*problems)  # which keys are valid depends on it
+    shape = schema.schema(mechanism)
+
+    # Tables and keys that are wrong are left out of the document; the checks below skip what is not there.
+    document: Document = {}
+    with_table: list[str] = []
+    for name in schema.TABLES:
+        section = shape.sections.get(name)
+        if section is None:
+            kinds, default = (shape.reference, "sine") if name == "reference" else (shape.base_motion, "none")
+            chosen = _section_of_kind(kinds, default, given[name], name, where)
+            if isinstance(chosen, list):
+                problems += chosen
+                document[name] = {}
+                continue
+            section, given[name] = chosen
+        document[name], wrong = schema.check(section, given[name], name, where)
+        problems += wrong
+        if not wrong and document[name].get("kind") == "table":
+            with_table.append(name)
+
+    problems += _exponent_problems(document["control"], where)
+    problems += _sampling_problems(document, given["control"], where)
+    problems += _whole_problems(document, "simulation.duration", where)
+    duration = document["simulation"].get("duration", 0.0)
+    units = {
+        "reference": {joint.name: joint.unit for joint in MECHANISMS[mechanism].joints},
+        "base_motion": {c.key: c.unit for c in COORDINATES},
+    }
+    tables = []
+    for name in with_table:
+        try:
+            tables.append(_load_table(document[name], name, units[name], duration, folder, where))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(*problems)
+    return document, tuple(tables)
+
+
+def _section_of_kind(
+    kinds: Mapping[str, type[schema.Section]], default: str, table: dict[str, Any], name: str, where: Where
+) -> tuple[type[schema.Section], dict[str, Any]] | list[Problem]:
+    """The section for the table's kind, and the table with its kind."""
+    key = f"{name}.kind"
+    kind = table.get("kind", default)
+    if not isinstance(kind, str) or kind not in kinds:
+        text = kind if isinstance(kind, str) else ""
+        return [Problem(where(key), key, "unknown kind", schema.given_text(kind), text, tuple(kinds))]
+    foreign = {
+        item: [other for other, section in kinds.items() if item in section.model_fields]
+        for item in table
+        if item not in kinds[kind].model_fields
+    }
+    misplaced = [
+        Problem(
+            where(f"{name}.{item}"),
+            f"{name}.{item}",
+            f"only goes with kind = {' or '.join(map(repr, of))}",
+            f"kind = {kind!r}" + ("" if "kind" in table else " (the default)"),
+        )
+        for item, of in foreign.items()
+        if of
+    ]
+    return misplaced or (kinds[kind], table | {"kind": kind})
+
+
+def _exponent_problems(control: Mapping[str, Any], where: Where) -> list[Problem]:
+    """l > m and r > p (PAPER section 4)."""
+    return [
+        Problem(
+            where(f"control.{high}"),
+            f"control.{high}",
+            f"expected {high} > {low}",
+            f"{high} = {control[high]}, {low} = {control[low]}",
+        )
+        for high, low in (("l", "m"), ("r", "p"))
+        if high in control and low in control and control[high] <= control[low]
+    ]
+
+
+def _sampling_problems(document: Document, given: Mapping[str, object], where: Where) -> list[Problem]:
+    """A sampled control has a period, a whole multiple of the step."""
+    control, key = document["control"], "control.period"
+    if "period" not in given:
+        if control.get("mode") != "sampled":
+            return []
+        text = f"is missing: expected {schema.number_text(POSITIVE, 's')}, for the control is sampled"
+        return [Problem(where(key), key, text)]
+    if "mode" not in given:  # else a forgotten mode would go unnoticed
+        return [Problem(where(key), key, 'only goes with mode = "sampled"', 'no mode (the default is "continuous")')]
+    return _whole_problems(document, key, where)
+
+
+def _whole_problems(document: Document, key: str, where: Where) -> list[Problem]:
+    """The time at `key` must be a whole multiple of the step."""
+    table, _, name = key.partition(".")
+    if name not in document[table] or "step" not in document["simulation"]:
+        return []
+    time, step = document[table][name], document["simulation"]["step"]
+    ratio = time / step
+    if math.isfinite(ratio) and round(ratio) >= 1 and abs(ratio - round(ratio)) <= _WHOLE * ratio:
+        return []
+    text = f"expected a whole multiple of simulation.step = {step!r} s"
+    if math.isfinite(ratio):
+        text += f" (the nearest is {max(round(ratio), 1) * step:.12g} s)"
+    return [Problem(where(key), key, text, f"{time!r} s")]
+
+
+def _load_table(
+    table: dict[str, Any], name: str, units: Mapping[str, str], duration: float, folder: Path, where: Where
+) -> Table:
+    """The signal table that [reference] or [base_motion] asks for; makes path and units in `table` explicit."""
+    columns, chosen = table["columns"], table["units"]
+    si = {"t": "s", **units}
+    problems = [
+        Problem(where(f"{name}.units.{key}"), f"{name}.units.{key}", f"there is no columns.{key} that has this unit")
+        for key in chosen
+        if key not in columns
+    ]
+    if len(columns) == 1:
+        key = f"{name}.columns"
+        problems.append(Problem(where(key), key, f"expected a column for at least one of {', '.join(units)}"))
+    if problems:
+        raise InputError(*problems)
+    table["units"] = chosen = {key: chosen.get(key, si[key]) for key in si if key in columns}
+    table["path"] = path = canonical_path(table["path"], folder)
+    wanted = [
+        Column(columns[key], f"{name}.columns.{key}", UNITS.get(si[key], {}).get(unit, 1.0))
+        for key, unit in chosen.items()
+    ]
+    key = f"{name}.path"
+    data = read_signal_file(path, where(key), key)
+    read = read_table(data, path, wanted[0], wanted[1:], cast(Ends, table["ends"]), where=where(key), key=key)
+    if not read.covers(duration):
+        text = (
+            f'{path} lasts from {read.t0:g} to {read.end:g} s: expected all of 0 to {duration:g} s with ends = "error"'
+        )
+        raise InputError(Problem(where(f"{name}.ends"), f"{name}.ends", text))
+    return read

@@ -1,0 +1,84 @@
+"""Where scenarios and their CSV files are: in the user's folders, or packaged with springline."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from springline.runner.errors import InputError, Problem, unknown
+
+PACKAGED = "springline:"
+"""A path that begins so is that of a file beside the packaged scenarios: "springline:data/vessel_orcaflex_10hz.csv"."""
+
+
+def packaged_scenarios() -> tuple[str, ...]:
+    """Names of the scenarios that come with springline, sorted."""
+    return tuple(sorted(name for name in _packaged(scenarios_folder(), ".toml") if not name.startswith("sweeps/")))
+
+
+def scenarios_folder() -> Traversable:
+    """The folder of the packaged scenarios."""
+    return resources.files("springline.runner") / "scenarios"
+
+
+def _packaged_file(name: str) -> Traversable:
+    return scenarios_folder().joinpath(*name.split("/"))
+
+
+def _packaged(folder: Traversable, suffix: str, prefix: str = "") -> Iterator[str]:
+    """Names of the packaged files below `folder`, with slashes; without the suffix if it is ".toml"."""
+    for item in folder.iterdir():
+        if item.is_dir():
+            yield from _packaged(item, suffix, f"{prefix}{item.name}/")
+        elif item.name.endswith(suffix):
+            yield prefix + (item.name.removesuffix(suffix) if suffix == ".toml" else item.name)
+
+
+def read_scenario(source: str | Path) -> tuple[str, Path]:
+    """Text of a scenario (a file, or a packaged one by name), and the folder that its relative paths refer to.
+
+    Raises InputError if there is none.
+    """
+    name = str(source)
+    if not isinstance(source, Path) and name in packaged_scenarios():
+        file = _packaged_file(f"{name}.toml")
+        return file.read_text("utf-8"), Path(str(file)).parent
+    path = Path(source)
+    if not path.exists():
+        if path.suffix == ".toml" and path.parent.is_dir():
+            there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
+            raise InputError(Problem(name, "", "there is no such file", "", path.name, there))
+        raise InputError(unknown(name, "", "file or packaged scenario", name, packaged_scenarios()))
+    try:
+        return path.read_text("utf-8-sig"), path.resolve().parent
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({error})")) from error
+
+
+def canonical_path(path: str, folder: Path) -> str:
+    """A path as it means the same from every folder."""
+    return path if path.startswith(PACKAGED) else str((folder / path).resolve())
+
+
+def read_signal_file(path: str, where: str, key: str) -> bytes:
+    """Contents of a CSV file, given by its canonical path.
+
+    where, key  what refers to it, for messages
+    Raises InputError if it cannot be read.
+    """
+    if path.startswith(PACKAGED):
+        name = path.removeprefix(PACKAGED)
+        names = sorted(_packaged(scenarios_folder(), ".csv"))
+        if name not in names:
+            raise InputError(unknown(where, key, "packaged file", path, [PACKAGED + n for n in names]))
+        return _packaged_file(name).read_bytes()
+    file = Path(path)
+    try:
+        return file.read_bytes()
+    except FileNotFoundError as error:
+        there = tuple(sorted(item.name for item in file.parent.glob("*.csv")))
+        raise InputError(Problem(where, key, f"there is no file {path}", "", file.name, there)) from error
+    except OSError as error:
+        raise InputError(Problem(where, key, f"{path} cannot be read ({error.strerror})")) from error

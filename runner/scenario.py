@@ -1,0 +1,324 @@
+"""Scenarios: a TOML file, checked as a whole, then everything the model and the loop want to know of it."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from springline.model.base import COORDINATES
+from springline.model.mechanisms import MECHANISMS
+from springline.model.parameters import POSITIVE, Bounds
+from springline.model.sliding import LogForm, SurfaceExponents
+from springline.model.system import MotorStart, SignalKind, SignalShape, Structure, System
+from springline.runner import schema
+from springline.runner.checking import Document, resolve
+from springline.runner.dotted import flat, plain, replaced, scale_key
+from springline.runner.errors import InputError, Problem, unknown
+from springline.runner.locate import packaged_scenarios, read_scenario
+from springline.runner.tables import Table
+from springline.runner.toml_text import document_text
+
+__all__ = ["NumericKey", "Scenario", "load_scenario", "packaged_scenarios", "parse_set"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class NumericKey:
+    """A number that may differ from run to run within one structure.
+
+    leaves  the entries of the scenario that it sets: itself, or one for each joint
+    """
+
+    unit: str
+    bounds: Bounds
+    meaning: str
+    leaves: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario with every default filled in; immutable. Two are equal if their documents and tables are.
+
+    source    the file or packaged name it was loaded from
+    folder    what relative paths in it refer to
+    document  its tables as plain data; read it, do not change it
+    """
+
+    source: str = field(compare=False)
+    folder: Path = field(compare=False)
+    document: Document
+    signal_tables: tuple[Table, ...]
+
+    def __hash__(self) -> int:
+        return hash(self.to_toml())
+
+    # What the loop is told
+
+    @property
+    def step(self) -> float:
+        """Step of the integrator, s."""
+        return float(self._simulation["step"])
+
+    @property
+    def steps(self) -> int:
+        """Number of steps of a complete run."""
+        return round(float(self._simulation["duration"]) / self.step)
+
+    @property
+    def control_every(self) -> int:
+        """Steps per sample of the control; 0 means continuous."""
+        control = self.document["control"]
+        return round(control["period"] / self.step) if control["mode"] == "sampled" else 0
+
+    @property
+    def integrator(self) -> str:
+        """Name of the integrator."""
+        return str(self._simulation["integrator"])
+
+    @property
+    def output_every(self) -> int:
+        """Steps per row of the trajectory."""
+        return int(self._simulation["output_every"])
+
+    @property
+    def bound(self) -> float:
+        """Largest |x_i| before a run is stopped, SI units."""
+        return float(self._simulation["bound"])
+
+    @property
+    def response_band(self) -> float:
+        """Fraction of |e_i(0)| that defines the response time."""
+        return float(self._simulation["response_band"])
+
+    @property
+    def settling_band(self) -> float:
+        """Fraction of |e_i(0)| that defines the settling time."""
+        return float(self._simulation["settling_band"])
+
+    @property
+    def _simulation(self) -> dict[str, Any]:
+        return self.document["simulation"]
+
+    # What the model is told
+
+    def structure(self) -> Structure:
+        """Everything about the scenario that is no number."""
+        control, motor = self.document["control"], self.document["initial"]["q_motor"]
+        mechanism = self.document["mechanism"]["name"]
+        joints = [joint.name for joint in MECHANISMS[mechanism].joints]
+        return Structure(
+            mechanism=mechanism,
+            law=control["law"],
+            log_form=cast(LogForm, control["log_form"]),
+            exponents=SurfaceExponents(**{name: control[name] for name in ("l", "m", "p", "r")}),
+            reference=_shape(self.document["reference"], joints),
+            base_motion=_shape(self.document["base_motion"], [c.key for c in COORDINATES]),
+            initial_motor=cast(MotorStart, motor if isinstance(motor, str) else "given"),
+        )
+
+    def system(self) -> System:
+        """The System of the structure; the same object for equal structures."""
+        return _system(self.structure())
+
+    def tables(self) -> list[Table]:
+        """The signal tables, in the order of System.tables."""
+        return list(self.signal_tables)
+
+    def values(self) -> Floats:
+        """The parameter vector p, in the order of System.slots."""
+        return np.array([self._slot(slot.key, self._numbers) for slot in self.system().slots], dtype=np.float64)
+
+    def value_of(self, key: str) -> object:
+        """The value of a dotted key: of a slot of p as the run uses it ("plant.m3"), else of the document.
+
+        Raises InputError if there is no such key.
+        """
+        try:
+            return self._slot(key, self._numbers)
+        except KeyError:
+            entries = dict(flat(self.document))
+        if key not in entries:
+            raise InputError(unknown(self.source, key, "key", key, [*entries, *self.numeric_keys()]))
+        return entries[key]
+
+    def numeric_keys(self) -> dict[str, NumericKey]:
+        """Every number that may vary within the structure, by dotted key.
+
+        "mechanism.m3" moves the controller's value, and the plant's unless the plant has its own; "plant.m3" and
+        "plant.m3.scale" move the plant's alone; "control.mu" moves all joints, "control.mu.0" one.
+        """
+        system, keys = self.system(), {}
+        groups: dict[str, list[str]] = {}
+        given = system.structure.initial_motor == "given"
+        for slot in system.slots:
+            if slot.key.startswith("initial.q_motor.") and not given:
+                continue
+            unit = schema.unit_text(slot.unit, system.joints)
+            keys[slot.key] = NumericKey(unit, slot.bounds, slot.meaning, (slot.key,))
+            if slot.key.startswith("plant."):
+                scale = scale_key(slot.key)
+                keys[scale] = NumericKey("1", POSITIVE, f"{slot.meaning}, as a factor on the controller's", (scale,))
+        for key in keys:
+            stem, _, last = key.rpartition(".")
+            if last.isdigit():
+                groups.setdefault(stem, []).append(key)
+        for stem, leaves in groups.items():
+            units = " or ".join(dict.fromkeys(keys[leaf].unit for leaf in leaves))
+            first = keys[leaves[0]]
+            meaning = first.meaning.rpartition(" (")[0]
+            keys[stem] = NumericKey(units, first.bounds, f"{meaning} (all joints)", tuple(leaves))
+        return keys
+
+    def values_for(self, columns: Mapping[str, ArrayLike]) -> Floats:
+        """One parameter vector a run, (runs, slots): `columns` holds one number a run for each of its numeric keys.
+
+        Where two keys set the same entry, the later one counts.
+        Raises InputError for an unknown key, a value out of bounds, and columns of different lengths.
+        """
+        keys, problems = self.numeric_keys(), []
+        numbers: dict[str, float | Floats] = dict(self._numbers)
+        runs = 1
+        for name, values in columns.items():
+            if name not in keys:
+                problems.append(unknown(self.source, name, "numeric key", name, keys))
+                continue
+            column = np.asarray(values)
+            if column.ndim != 1 or column.dtype.kind not in "iuf" or (runs not in (1, len(column))):
+                text = "expected a column of numbers, one for each run, as long as the others"
+                problems.append(Problem(self.source, name, text, f"shape {column.shape} of {column.dtype}"))
+                continue
+            column = column.astype(np.float64)
+            runs = len(column)
+            outside = _first_outside(keys[name].bounds, column)
+            if outside is not None:
+                text = f"run {outside}: expected {schema.number_text(keys[name].bounds, keys[name].unit)}"
+                problems.append(Problem(self.source, name, text, schema.given_text(float(column[outside]))))
+            for leaf in keys[name].leaves:
+                if leaf.startswith("plant."):  # a value and a factor exclude each other
+                    numbers.pop(leaf.replace(".scale", "") if ".scale" in leaf else scale_key(leaf), None)
+                numbers[leaf] = column
+        if problems:
+            raise InputError(*problems)
+        slots = self.system().slots
+        result = np.empty((runs, len(slots)))
+        for i, slot in enumerate(slots):
+            result[:, i] = self._slot(slot.key, numbers)
+        return result
+
+    @cached_property
+    def _numbers(self) -> dict[str, float]:
+        """The document's floats by dotted key."""
+        return {key: value for key, value in flat(self.document) if isinstance(value, float)}
+
+    def _slot(self, key: str, numbers: Mapping[str, Any]) -> Any:
+        """The value (or column of values) of one slot; KeyError if it is no slot of this scenario."""
+        table, _, name = key.partition(".")
+        if table == "plant" and key not in numbers:
+            nominal = next((f"{t}.{name}" for t in ("mechanism", "drive") if f"{t}.{name}" in numbers), key)
+            return numbers[nominal] * numbers.get(scale_key(key), 1.0)
+        if name.startswith("K_f.") and not self.document["control"]["fast"]:
+            return 0.0 * numbers[key]
+        if name.startswith("q_motor.") and key not in numbers:
+            return 0.0  # not read: the structure says how the motors start
+        return numbers[key]
+
+    # Changed and written
+
+    def with_overrides(self, overrides: Mapping[str, object]) -> Scenario:
+        """This scenario with other values at some dotted keys ("control.mu.0", "plant.m3.scale", …).
+
+        A new kind of reference or base motion, or a new mechanism, drops what belonged to the old one.
+        Raises InputError for whatever a file may not hold either.
+        """
+        document = copy.deepcopy(self.document)
+        for table in ("reference", "base_motion"):
+            kind = overrides.get(f"{table}.kind", document[table]["kind"])
+            if kind != document[table]["kind"]:
+                document[table] = {"kind": kind}
+        if overrides.get("mechanism.name", self.document["mechanism"]["name"]) != self.document["mechanism"]["name"]:
+            control = {k: v for k, v in document["control"].items() if not isinstance(v, list)}
+            document = {name: document[name] for name in ("base_motion", "simulation")} | {"control": control}
+        problems = []
+        joints = len(MECHANISMS[self.document["mechanism"]["name"]].joints)
+        where = f"override of {self.source}"
+        for key, value in overrides.items():
+            try:
+                document = replaced(document, key.split("."), plain(value), joints)
+            except LookupError as error:
+                problems.append(Problem(where, key, f"there is no such entry: {error.args[0]}"))
+        if problems:
+            raise InputError(*problems)
+        return Scenario(self.source, self.folder, *resolve(document, self.source, self.folder, tuple(overrides)))
+
+    def to_toml(self) -> str:
+        """The complete scenario as TOML; loading it gives an equal one."""
+        return document_text(self.document)
+
+
+def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
+    """Load a scenario: a TOML file, or a packaged one by name ("paper/group1_shake").
+
+    overrides  values by dotted key that take the place of the file's
+    Raises InputError that names all mistakes at once: file, key, what was expected, the nearest valid name.
+    """
+    name = str(source)
+    text, folder = read_scenario(source)
+    try:
+        document = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
+    scenario = Scenario(name, folder, *resolve(document, name, folder))
+    return scenario.with_overrides(overrides) if overrides else scenario
+
+
+def parse_set(text: str) -> tuple[str, object]:
+    """KEY=TOMLVALUE as a key and a value: "control.delta=0.02", 'control.law="power"', "plant.m3={ scale = 1.2 }".
+
+    Raises InputError if it is not of that form.
+    """
+    key, equals, value = text.partition("=")
+    key = key.strip()
+    if not equals or not key:
+        raise InputError(Problem("--set", "", "expected KEY=VALUE", schema.given_text(text)))
+    try:
+        parsed = tomllib.loads(f"value = {value}")
+    except (ValueError, RecursionError) as error:
+        hint = f"expected a TOML value ({error}); a text needs quotes: --set '{key}=\"…\"'"
+        raise InputError(Problem("--set", key, hint, value.strip())) from error
+    if set(parsed) != {"value"}:
+        raise InputError(Problem("--set", key, "expected one TOML value", schema.given_text(value)))
+    return key, parsed["value"]
+
+
+@lru_cache(maxsize=64)
+def _system(structure: Structure) -> System:
+    return System(structure)
+
+
+def _shape(table: Mapping[str, Any], coordinates: Sequence[str]) -> SignalShape:
+    kind = cast(SignalKind, table["kind"])
+    if kind == "table":
+        return SignalShape(kind, tuple(int(name in table["columns"]) for name in coordinates))
+    if kind == "none":
+        return SignalShape(kind, (0,) * len(coordinates))
+    terms = (table[name] for name in coordinates)
+    return SignalShape(kind, tuple(len(t["terms"] if isinstance(t, dict) else t) for t in terms))
+
+
+def _first_outside(bounds: Bounds, column: Floats) -> int | None:
+    """Index of the first value that is out of bounds; bounds are an interval, so the extremes tell for all."""
+    if column.size == 0:
+        return None
+    inside = not np.isnan(column).any() and bounds.holds(float(column.min())) and bounds.holds(float(column.max()))
+    if inside and not (bounds.even and np.any(column % 2)):
+        return None
+    return next(i for i, value in enumerate(column) if not bounds.holds(float(value)))

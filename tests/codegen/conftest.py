@@ -1,0 +1,49 @@
+"""The paper's nominal numbers under a shake, for tests of the generated code that do without scenario files."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from springline.codegen.program import Program, program
+from springline.model.system import SignalShape, Structure
+
+NOMINAL = {
+    "reference.lift.terms.0.amplitude": 1.0,
+    "reference.lift.terms.0.omega": math.pi,
+    "reference.rotation.offset": 1.0,
+    "reference.rotation.terms.0.amplitude": 1.0,
+    "reference.rotation.terms.0.omega": 0.5 * math.pi,
+    "initial.q.0": 0.8,
+    "initial.q.1": 0.5,
+    "base_motion.shake.0.amplitude": 0.1,
+    "base_motion.shake.0.omega": 10.0,
+    "base_motion.pitch.0.amplitude": 0.05,
+    "base_motion.pitch.0.omega": 3.0,
+    "base_motion.roll.0.amplitude": 0.1,
+    "base_motion.roll.0.omega": 2.0,
+    "base_motion.roll.0.phase": 0.5,
+}
+
+
+@pytest.fixture(scope="session")
+def structure() -> Structure:
+    """The paper's arm with its own law, a base that shakes, pitches and rolls."""
+    return Structure(base_motion=SignalShape("sine", (1, 1, 1)))
+
+
+@pytest.fixture(scope="session")
+def shaken(structure: Structure) -> Program:
+    return program(structure)
+
+
+@pytest.fixture(scope="session")
+def values_of() -> Callable[..., NDArray[np.float64]]:
+    """values_of(program, {key: value}): all slots, nominal but for the overrides."""
+
+    def values(of: Program, overrides: dict[str, float] | None = None) -> NDArray[np.float64]:
+        wanted = {**NOMINAL, **(overrides or {})}
+        return np.array([wanted.get(slot.key, slot.default) for slot in of.system.slots])
+
+    return values

@@ -1,0 +1,221 @@
+"""Both engines, any width, any compiler: the same bits (docs/equal-bits.md)."""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from springline.codegen import lanes, toolchain
+from springline.codegen.kernel import Kernel, KernelOptions, LoopSettings, Runs
+from springline.codegen.program import Program
+from springline.model.linear import as_written
+
+Values = Callable[..., NDArray[np.float64]]
+SHORT = LoopSettings(steps=400, step=1e-4, output_every=50)
+VARIED = ("control.delta", "plant.m3", "base_motion.shake.0.amplitude", "initial.q.0")
+
+
+def spread(program: Program, values_of: Values, runs: int) -> NDArray[np.float64]:
+    """Nominal values, with the varied keys different in every run."""
+    table = np.tile(values_of(program), (runs, 1))
+    keys = [slot.key for slot in program.system.slots]
+    rng = np.random.default_rng(7)
+    for key in VARIED:
+        table[:, keys.index(key)] *= rng.uniform(0.9, 1.1, runs)
+    return table
+
+
+def run(
+    program: Program,
+    table: NDArray[np.float64],
+    options: KernelOptions,
+    *,
+    sampled: bool = False,
+    settings: LoopSettings = SHORT,
+) -> Runs:
+    kernel = Kernel(program, sampled, options, tuple(table[0]))
+    keys = [slot.key for slot in program.system.slots]
+    return kernel.run(table[:, [keys.index(key) for key in kernel.parameters]], settings)
+
+
+def assert_same(actual: Runs, expected: Runs) -> None:
+    for name in ("final_state", "end_time", "status", "quantity", "rows", "trajectory", "metrics"):
+        a, b = getattr(actual, name), getattr(expected, name)
+        assert a.shape == b.shape
+        differ = np.argwhere(~((a.view(f"i{a.itemsize}") == b.view(f"i{b.itemsize}")) | ((a != a) & (b != b))))
+        assert not len(differ), f"{name}: {len(differ)} of {a.size} entries differ, first at {differ[0]}"
+
+
+@pytest.fixture(scope="module")
+def table(shaken: Program, values_of: Values) -> NDArray[np.float64]:
+    return spread(shaken, values_of, 37)
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["continuous", "sampled"])
+def reference(request: pytest.FixtureRequest, shaken: Program, table: NDArray[np.float64]) -> tuple[bool, Runs]:
+    sampled = request.param
+    return sampled, run(
+        shaken, table, KernelOptions(engine="casadi", flags=("-O2",)), sampled=sampled, settings=replace(SHORT, hold=5)
+    )
+
+
+LANES = [
+    KernelOptions(width=1, groups=1, flags=("-O0",)),
+    KernelOptions(width=1, groups=1, tunable=VARIED),
+    KernelOptions(width=2, groups=1, flags=("-O1",)),
+    KernelOptions(width=4, groups=2, flags=("-O2",), tunable=VARIED),
+    KernelOptions(width=4, groups=1),
+    KernelOptions(width=8, groups=2, flags=("-O2",)),
+    KernelOptions(width=16, groups=1, flags=("-O1",), tunable=VARIED),
+    KernelOptions(),
+]
+
+
+@pytest.mark.parametrize(
+    "options", LANES, ids=lambda o: f"W{o.width}G{o.groups}{''.join(o.flags or ())}{'-baked' * bool(o.tunable)}"
+)
+def test_lanes_equal_casadi(
+    options: KernelOptions, reference: tuple[bool, Runs], shaken: Program, table: NDArray[np.float64]
+) -> None:
+    sampled, expected = reference
+    assert_same(run(shaken, table, options, sampled=sampled, settings=replace(SHORT, hold=5)), expected)
+
+
+@pytest.mark.parametrize("flags", [("-O0",), ("-O3", "-march=native")], ids=["O0", "O3native"])
+def test_clang_equals_gcc(
+    flags: tuple[str, ...],
+    reference: tuple[bool, Runs],
+    shaken: Program,
+    table: NDArray[np.float64],
+    require_tool: Callable[..., str],
+) -> None:
+    clang = toolchain.probe_compiler([require_tool("clang", "apt-get install clang")])
+    assert clang is not None
+    sampled, expected = reference
+    for engine in ("casadi", "lanes"):
+        options = KernelOptions(engine=engine, flags=flags, compiler=clang)  # type: ignore[arg-type]  # Literal
+        assert_same(run(shaken, table, options, sampled=sampled, settings=replace(SHORT, hold=5)), expected)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_every_build(
+    compiler: str,
+    reference: tuple[bool, Runs],
+    shaken: Program,
+    table: NDArray[np.float64],
+    require_tool: Callable[..., str],
+) -> None:
+    found = toolchain.probe_compiler([require_tool(compiler)])
+    assert found is not None
+    sampled, expected = reference
+    settings = replace(SHORT, hold=5)
+    machines: list[Sequence[str]] = [("-march=x86-64",), ("-march=x86-64-v3",), ("-march=native",)]
+    for level, machine in itertools.product(("-O0", "-O1", "-O2", "-O3"), machines):
+        flags = (level, *machine)
+        casadi = KernelOptions(engine="casadi", flags=flags, compiler=found)
+        assert_same(run(shaken, table, casadi, sampled=sampled, settings=settings), expected)
+        for width, groups, tunable in itertools.product((1, 2, 4, 8, 16), (1, 2), (None, VARIED)):
+            options = KernelOptions(width=width, groups=groups, tunable=tunable, flags=flags, compiler=found)
+            assert_same(run(shaken, table, options, sampled=sampled, settings=settings), expected)
+
+
+def test_neighbours_do_not_matter(shaken: Program, table: NDArray[np.float64]) -> None:
+    """A run alone, first in a pack, last in a pack, beside runs that diverge: the same bits."""
+    kernel = Kernel(shaken, False, KernelOptions(width=4, groups=2))
+    together = kernel.run(table, SHORT)
+    keys = [slot.key for slot in shaken.system.slots]
+    wild = table.copy()
+    wild[::3, keys.index("plant.m3")] = 1e-9
+    wild[::3, keys.index("initial.q.0")] = 1e5
+    beside = kernel.run(wild, SHORT)
+    assert set(beside.status[::3]) == {2} or set(beside.status[::3]) <= {1, 2}
+    for i in (1, 5, 20, 36):
+        alone = kernel.run(table[i : i + 1], SHORT)
+        assert alone.final_state.tobytes() == together.final_state[i : i + 1].tobytes()
+        if i % 3:
+            assert beside.final_state[i].tobytes() == together.final_state[i].tobytes()
+            assert beside.metrics[i].tobytes() == together.metrics[i].tobytes()
+
+
+def random_program(program: Program, seed: int) -> Program:
+    """The same loop around random functions: every operation the emitter knows, masks used as numbers and as masks."""
+    rng = np.random.default_rng(seed)
+    unary = [
+        ca.sin,
+        ca.cos,
+        ca.tan,
+        ca.exp,
+        ca.expm1,
+        ca.fabs,
+        ca.sign,
+        ca.floor,
+        ca.ceil,
+        lambda a: -a,
+        lambda a: a**2,
+        lambda a: 2 * a,
+        lambda a: 1 / (a + 3.5),
+        lambda a: ca.sqrt(ca.fabs(a)),
+        lambda a: ca.log(ca.fabs(a) + 0.1),
+        lambda a: ca.log1p(ca.fabs(a)),
+        lambda a: ca.fabs(a) ** 1.5,
+        lambda a: (a**2 + 0.01) ** (-1 / 3),
+    ]
+    binary = [
+        lambda a, b: a + b,
+        lambda a, b: a - b,
+        lambda a, b: a * b,
+        lambda a, b: a / (b**2 + 1),
+        ca.fmin,
+        ca.fmax,
+        lambda a, b: ca.fabs(a) ** ca.sin(b),
+        lambda a, b: ca.if_else(a < b, a, b),
+        lambda a, b: (a <= b) * a,
+        lambda a, b: ca.if_else(ca.logic_and(a < 1, ca.logic_not(b == a)), 2 * b, a),
+        ca.copysign,
+        ca.hypot,
+        lambda a, b: ca.logic_or(a != b, b < 0) + a,
+    ]
+    functions = dict(program.functions)
+    for name in ("run", "time", "error", "control", "plant"):
+        old = functions[name]
+        inputs = old.sx_in()
+        pool = [e for vector in inputs for e in ca.vertsplit(vector)] if inputs else []
+        outputs = []
+        with as_written():
+            for k in range(old.n_out()):
+                row = []
+                for _ in range(old.numel_out(k)):
+                    for _ in range(3):
+                        a, b = (pool[i] for i in rng.integers(len(pool), size=2))
+                        pool.append(unary[rng.integers(len(unary))](a))
+                        pool.append(binary[rng.integers(len(binary))](pool[-1], b))
+                    row.append(ca.sin(pool[-1]) if name == "plant" else ca.cos(pool[-1]))
+                outputs.append(ca.vertcat(*row))
+            names = [[old.name_in(i) for i in range(old.n_in())], [old.name_out(i) for i in range(old.n_out())]]
+            functions[name] = ca.Function(old.name(), inputs, ca.cse(outputs), *names)
+    return Program(program.system, functions)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_functions_equal_casadi(seed: int, shaken: Program, table: NDArray[np.float64]) -> None:
+    random = random_program(shaken, seed)
+    settings = LoopSettings(steps=12, step=1e-2, output_every=3)
+    expected = run(random, table[:9], KernelOptions(engine="casadi", flags=("-O1",)), settings=settings)
+    assert np.isfinite(expected.final_state).all()
+    for options in (
+        KernelOptions(width=4, groups=2, flags=("-O1",)),
+        KernelOptions(width=2, tunable=VARIED, flags=("-O1",)),
+    ):
+        assert_same(run(random, table[:9], options, settings=settings), expected)
+
+
+def test_an_operation_without_c_is_refused_by_name(shaken: Program) -> None:
+    old = shaken.functions["plant"]
+    inputs = old.sx_in()
+    bad = ca.Function("loop_plant", inputs, [ca.erf(inputs[2])])
+    with pytest.raises(lanes.UnprintableOperation, match=r"OP_ERF.*plant"):
+        lanes.emit(Program(shaken.system, {**shaken.functions, "plant": bad}), {}, 1)
