@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from springline.codegen.program import Program, program
 from springline.model.system import SignalShape, Structure
 

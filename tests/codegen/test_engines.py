@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+
 from springline.codegen import lanes, toolchain
 from springline.codegen.kernel import Kernel, KernelOptions, LoopSettings, Runs
 from springline.codegen.program import Program
@@ -45,7 +46,7 @@ def assert_same(actual: Runs, expected: Runs) -> None:
     for name in ("final_state", "end_time", "status", "quantity", "rows", "trajectory", "metrics"):
         a, b = getattr(actual, name), getattr(expected, name)
         assert a.shape == b.shape
-        differ = np.argwhere(~((a.view(f"i{a.itemsize}") == b.view(f"i{b.itemsize}")) | ((a != a) & (b != b))))
+        differ = np.argwhere(~((a.view(f"i{a.itemsize}") == b.view(f"i{b.itemsize}")) | (np.isnan(a) & np.isnan(b))))
         assert not len(differ), f"{name}: {len(differ)} of {a.size} entries differ, first at {differ[0]}"
 
 

@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+
 from springline.codegen.program import Program, count_operations
 from springline.codegen.staging import split
 
