@@ -3,21 +3,33 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from importlib import resources
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from springline.codegen import casadi_c, lanes, toolchain
+from springline.codegen import toolchain
+from springline.codegen.kernel_source import Engine, KernelOptions, KernelSource, print_kernel
 from springline.codegen.program import Program, program
-from springline.model.base import COORDINATES
 from springline.model.system import Structure, TableLayout
 
-Engine = Literal["lanes", "casadi"]
+__all__ = [
+    "METRICS",
+    "STATUS",
+    "Control",
+    "Engine",
+    "Kernel",
+    "KernelOptions",
+    "LoopSettings",
+    "Runs",
+    "Table",
+    "compile_kernel",
+    "kernel",
+]
+
 Floats = NDArray[np.float64]
 
 METRICS = (
@@ -35,28 +47,6 @@ METRICS = (
 
 STATUS = ("ok", "diverged", "out_of_bounds", "stopped")
 """In the order of simulate.h."""
-
-_RUNTIME = ("loop.c", "metrics.h", "simulate.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
-
-
-@dataclass(frozen=True, slots=True)
-class KernelOptions:
-    """How a kernel is printed and compiled; none of it changes a bit of the results.
-
-    engine   "lanes" or "casadi" (the reference, one run at a time, every parameter tunable)
-    width    lanes in a vector, None for the machine's
-    groups   vectors worked on at once to hide latency, None for what pays
-    tunable  slot keys that each run may set for itself, None for all; the others are baked
-    flags    optimisation flags, None for the best this machine can do
-    compiler  None for the one that is found
-    """
-
-    engine: Engine = "lanes"
-    width: int | None = None
-    groups: int | None = None
-    tunable: tuple[str, ...] | None = None
-    flags: tuple[str, ...] | None = None
-    compiler: toolchain.Compiler | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,39 +145,6 @@ class _Job(ctypes.Structure):
     ]
 
 
-def preamble(program: Program, *, width: int, groups: int, sampled: bool, sizes: Mapping[str, int]) -> str:
-    """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
-    channels = sum(len(table.channels) for table in program.system.tables)
-    numbers = {
-        "SL_NJ": program.system.n,
-        "SL_NX": program.size("x"),
-        "SL_NB": len(COORDINATES),
-        "SL_NP": sizes["p"],
-        "SL_NR": sizes["r"],
-        "SL_NU": sizes["uniform"],
-        "SL_NV": sizes["varying"],
-        "SL_ND": program.size("d"),
-        "SL_NTABLES": len(program.system.tables),
-    }
-    assert program.size("d") == len(program.system.tables) + 4 * channels
-    enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
-    return f"""#define SL_W {width}
-#define SL_G {groups}
-#define SL_SAMPLED {int(sampled)}
-#include "sl_lanes.h"
-
-typedef sl_v sl_group[SL_G]; /* one quantity of a pack of runs */
-
-/* Signals at one time: those that all runs share (SL_W doubles apart) and those of each run. */
-typedef struct {{
-  const double *uniform;
-  const sl_group *varying;
-}} sl_time;
-
-enum {{ {enum} }};
-"""
-
-
 class Kernel:
     """The compiled loop of one Program.
 
@@ -197,11 +154,10 @@ class Kernel:
     library     the shared library, in the cache
     """
 
-    def __init__(self, program: Program, sampled: bool, options: KernelOptions, baked: tuple[float, ...] = ()) -> None:
+    def __init__(self, program: Program, source: KernelSource, compiler: toolchain.Compiler | None = None) -> None:
         self.program = program
-        self.options = options
-        sources, self.parameters, flags = self._sources(sampled, baked)
-        self.library = toolchain.build_library(sources, main="loop.c", flags=flags, compiler=options.compiler)
+        self.parameters = source.parameters
+        self.library = toolchain.build_library(dict(source.files), main="loop.c", flags=source.flags, compiler=compiler)
         handle = toolchain.load(self.library)
         self._simulate: Any = handle.springline_simulate
         self._simulate.restype = None
@@ -209,31 +165,6 @@ class Kernel:
         handle.springline_layout(layout)
         self.width, parameters, self._states, self._metrics, self._columns, tables = layout
         assert parameters == len(self.parameters) and tables == len(self.program.system.tables)
-
-    def _sources(self, sampled: bool, baked: tuple[float, ...]) -> tuple[dict[str, str], tuple[str, ...], list[str]]:
-        compiler = self.options.compiler or toolchain.find_compiler()
-        best = ["-O3", *toolchain.native_flags(compiler)]
-        if compiler.family == "gcc":  # its scheduler before register allocation is what hides the latencies
-            best += ["-fschedule-insns", "-fsched-pressure"]
-        flags = [*(best if self.options.flags is None else self.options.flags), "-std=gnu99", "-fvisibility=hidden"]
-        flags += ["-Wno-unused-parameter", "-Wno-psabi"]
-        slots, size = self.program.system.slots, self.program.size
-        if self.options.engine == "casadi":
-            sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
-            start = preamble(self.program, width=1, groups=1, sampled=sampled, sizes=sizes)
-            kernel = casadi_c.kernel_header(self.program, start)
-            return {**runtime_sources(), **kernel}, tuple(slot.key for slot in slots), flags
-        tunable = self.options.tunable
-        constants = (
-            {}
-            if tunable is None
-            else {slot.key: value for slot, value in zip(slots, baked, strict=True) if slot.key not in tunable}
-        )
-        width = self.options.width or toolchain.native_vector_width()
-        groups = self.options.groups or (2 if width > 1 else 1)
-        emission = lanes.emit(self.program, constants, groups)
-        start = preamble(self.program, width=width, groups=groups, sampled=sampled, sizes=emission.sizes)
-        return {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}"}, emission.tunable, flags
 
     def run(
         self,
@@ -303,23 +234,21 @@ class Kernel:
         return result
 
 
-@lru_cache(maxsize=1)
-def runtime_sources() -> dict[str, str]:
-    """The C files of codegen/runtime/ by name."""
-    folder = resources.files("springline.codegen") / "runtime"
-    return {name: (folder / name).read_text() for name in _RUNTIME}
+def compile_kernel(
+    program: Program, sampled: bool = False, options: KernelOptions | None = None, baked: tuple[float, ...] = ()
+) -> Kernel:
+    """Print and compile the Kernel of a Program; see `print_kernel`. Raises ToolchainError."""
+    options = options or KernelOptions()
+    return Kernel(program, print_kernel(program, sampled, options, baked), options.compiler)
 
 
 @lru_cache(maxsize=64)
 def kernel(
-    structure: Structure,
-    sampled: bool = False,
-    options: KernelOptions | None = None,
-    baked: tuple[float, ...] = (),
+    structure: Structure, sampled: bool = False, options: KernelOptions | None = None, baked: tuple[float, ...] = ()
 ) -> Kernel:
-    """The Kernel of a structure, compiled on first need.
+    """The Kernel of a structure, compiled on first need and then remembered.
 
     baked  values of all slots, in their order, for a kernel with baked parameters; () when every slot is tunable
     Raises ToolchainError when there is no C compiler or it fails.
     """
-    return Kernel(program(structure), sampled, options or KernelOptions(), baked)
+    return compile_kernel(program(structure), sampled, options, baked)

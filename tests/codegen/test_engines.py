@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from springline.codegen import lanes, toolchain
-from springline.codegen.kernel import Kernel, KernelOptions, LoopSettings, Runs
+from springline.codegen.kernel import KernelOptions, LoopSettings, Runs, compile_kernel
 from springline.codegen.program import Program
 from springline.model.linear import as_written
 
@@ -37,7 +37,7 @@ def run(
     sampled: bool = False,
     settings: LoopSettings = SHORT,
 ) -> Runs:
-    kernel = Kernel(program, sampled, options, tuple(table[0]))
+    kernel = compile_kernel(program, sampled, options, tuple(table[0]))
     keys = [slot.key for slot in program.system.slots]
     return kernel.run(table[:, [keys.index(key) for key in kernel.parameters]], settings)
 
@@ -126,7 +126,7 @@ def test_every_build(
 
 def test_neighbours_do_not_matter(shaken: Program, table: NDArray[np.float64]) -> None:
     """A run alone, first in a pack, last in a pack, beside runs that diverge: the same bits."""
-    kernel = Kernel(shaken, False, KernelOptions(width=4, groups=2))
+    kernel = compile_kernel(shaken, False, KernelOptions(width=4, groups=2))
     together = kernel.run(table, SHORT)
     keys = [slot.key for slot in shaken.system.slots]
     wild = table.copy()

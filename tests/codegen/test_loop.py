@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen.kernel import METRICS, Control, Kernel, KernelOptions, LoopSettings, Runs, Table
+from springline.codegen.kernel import METRICS, Control, KernelOptions, LoopSettings, Runs, Table, compile_kernel
 from springline.codegen.program import Program, program
 from springline.model.linear import as_written
 from springline.model.system import SignalShape, Structure
@@ -38,7 +38,7 @@ def run(
     tables: tuple[Table, ...] = (),
     options: KernelOptions = PLAIN,
 ) -> Runs:
-    return Kernel(base, sampled, options).run(np.atleast_2d(values), settings, tables)
+    return compile_kernel(base, sampled, options).run(np.atleast_2d(values), settings, tables)
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -49,7 +49,7 @@ def test_rk4_has_order_four(sampled: bool, shaken: Program, values_of: Values) -
         shaken, lambda x: ca.vertcat(*(e for i, w in enumerate(omega) for e in (w * x[2 * i + 1], -w * x[2 * i])))
     )
     values = values_of(shaken)
-    kernel = Kernel(rotating, sampled, PLAIN)
+    kernel = compile_kernel(rotating, sampled, PLAIN)
     start = kernel.run(values[None, :], LoopSettings(0, 1.0)).final_state[0]
     angle = np.exp(-1j * omega * 2.0) * (start[0::2] + 1j * start[1::2])
     exact = np.stack([angle.real, angle.imag], axis=1).ravel()
@@ -219,7 +219,7 @@ def test_table_signals(options: KernelOptions, values_of: Values) -> None:
 
 
 def test_threads_share_nothing(shaken: Program, values_of: Values) -> None:
-    kernel = Kernel(shaken, False, KernelOptions())
+    kernel = compile_kernel(shaken, False, KernelOptions())
     table = np.tile(values_of(shaken), (24, 1))
     table[:, 1] *= np.linspace(0.9, 1.1, 24)
     settings = LoopSettings(2000, 1e-4)
@@ -235,7 +235,7 @@ def test_threads_share_nothing(shaken: Program, values_of: Values) -> None:
 
 
 def test_a_run_can_be_watched_and_stopped(shaken: Program, values_of: Values) -> None:
-    kernel = Kernel(shaken, False, PLAIN)
+    kernel = compile_kernel(shaken, False, PLAIN)
     control = Control()
     control.stop.value = 1
     result = kernel.run(values_of(shaken)[None, :], LoopSettings(100_000, 1e-5), control=control)
@@ -247,7 +247,7 @@ def test_a_run_can_be_watched_and_stopped(shaken: Program, values_of: Values) ->
 
 
 def test_wrong_shapes_are_refused(shaken: Program, values_of: Values) -> None:
-    kernel = Kernel(shaken, False, PLAIN)
+    kernel = compile_kernel(shaken, False, PLAIN)
     with pytest.raises(ValueError, match=r"expected \(runs, \d+\)"):
         kernel.run(np.zeros((2, 3)), LoopSettings(1, 1e-3))
     with pytest.raises(ValueError, match="the system has 0"):

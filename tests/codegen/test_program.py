@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from springline.codegen import toolchain
 from springline.codegen.casadi_c import print_functions
-from springline.codegen.kernel import runtime_sources
+from springline.codegen.kernel_source import runtime_sources
 from springline.codegen.program import Program
 
 Values = Callable[..., NDArray[np.float64]]

@@ -1,0 +1,138 @@
+"""The C of a kernel: the loop's fixed sources and the printed kernel.h, with the flags that compile them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Literal
+
+from springline.codegen import casadi_c, lanes, toolchain
+from springline.codegen.program import Program
+from springline.model.base import COORDINATES
+
+Engine = Literal["lanes", "casadi"]
+
+_RUNTIME = ("loop.c", "metrics.h", "simulate.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
+
+
+@dataclass(frozen=True, slots=True)
+class KernelOptions:
+    """How a kernel is printed and compiled; none of it changes a bit of the results.
+
+    engine   "lanes" or "casadi" (the reference, one run at a time, every parameter tunable)
+    width    lanes in a vector, None for the machine's
+    groups   vectors worked on at once to hide latency, None for what pays
+    tunable  slot keys that each run may set for itself, None for all; the others are baked
+    flags    optimisation flags, None for the best this machine can do
+    compiler  None for the one that is found
+    """
+
+    engine: Engine = "lanes"
+    width: int | None = None
+    groups: int | None = None
+    tunable: tuple[str, ...] | None = None
+    flags: tuple[str, ...] | None = None
+    compiler: toolchain.Compiler | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class KernelSource:
+    """All that a compiler has to be given: it may travel to another machine.
+
+    files       (name, text), loop.c is the one to compile
+    flags       compiler flags
+    parameters  slot keys in the order of the parameter columns
+    """
+
+    files: tuple[tuple[str, str], ...]
+    flags: tuple[str, ...]
+    parameters: tuple[str, ...]
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of files and parameters: equal hashes compute equal results."""
+        return hashlib.sha256(json.dumps([self.files, self.parameters]).encode()).hexdigest()
+
+
+def preamble(program: Program, *, width: int, groups: int, sampled: bool, sizes: Mapping[str, int]) -> str:
+    """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
+    channels = sum(len(table.channels) for table in program.system.tables)
+    numbers = {
+        "SL_NJ": program.system.n,
+        "SL_NX": program.size("x"),
+        "SL_NB": len(COORDINATES),
+        "SL_NP": sizes["p"],
+        "SL_NR": sizes["r"],
+        "SL_NU": sizes["uniform"],
+        "SL_NV": sizes["varying"],
+        "SL_ND": program.size("d"),
+        "SL_NTABLES": len(program.system.tables),
+    }
+    assert program.size("d") == len(program.system.tables) + 4 * channels
+    enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
+    return f"""#define SL_W {width}
+#define SL_G {groups}
+#define SL_SAMPLED {int(sampled)}
+#include "sl_lanes.h"
+
+typedef sl_v sl_group[SL_G]; /* one quantity of a pack of runs */
+
+/* Signals at one time: those that all runs share (SL_W doubles apart) and those of each run. */
+typedef struct {{
+  const double *uniform;
+  const sl_group *varying;
+}} sl_time;
+
+enum {{ {enum} }};
+"""
+
+
+def print_kernel(
+    program: Program, sampled: bool, options: KernelOptions, baked: tuple[float, ...] = ()
+) -> KernelSource:
+    """Print the kernel of a Program.
+
+    sampled  control once per sample (zero-order hold) instead of in every stage
+    baked    values of all slots, in their order; needed when `options.tunable` leaves some out
+    Raises UnprintableOperation, ToolchainError when there is no compiler to ask how wide its vectors are.
+    """
+    slots, size = program.system.slots, program.size
+    if options.engine == "casadi":
+        sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
+        start = preamble(program, width=1, groups=1, sampled=sampled, sizes=sizes)
+        parameters = tuple(slot.key for slot in slots)
+        files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}
+    else:
+        tunable = options.tunable
+        constants: dict[str, float] = {}
+        if tunable is not None:
+            pairs = zip(slots, baked, strict=True)
+            constants = {slot.key: value for slot, value in pairs if slot.key not in tunable}
+        width = options.width or toolchain.native_vector_width(options.compiler)
+        groups = options.groups or (2 if width > 1 else 1)
+        emission = lanes.emit(program, constants, groups)
+        start = preamble(program, width=width, groups=groups, sampled=sampled, sizes=emission.sizes)
+        parameters = emission.tunable
+        files = {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}"}
+    return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)
+
+
+def _flags(options: KernelOptions) -> tuple[str, ...]:
+    wanted = options.flags
+    if wanted is None:
+        compiler = options.compiler or toolchain.find_compiler()
+        wanted = ("-O3", *toolchain.native_flags(compiler))
+        if compiler.family == "gcc":  # its scheduler before register allocation is what hides the latencies
+            wanted += ("-fschedule-insns", "-fsched-pressure")
+    return (*wanted, "-std=gnu99", "-fvisibility=hidden", "-Wno-unused-parameter", "-Wno-psabi")
+
+
+@lru_cache(maxsize=1)
+def runtime_sources() -> dict[str, str]:
+    """The C files of codegen/runtime/ by name."""
+    folder = resources.files("springline.codegen") / "runtime"
+    return {name: (folder / name).read_text() for name in _RUNTIME}
