@@ -1,4 +1,4 @@
-"""Slow control (computed torque on a terminal sliding surface) and fast control (PAPER sections 4 and 5)."""
+"""Slow control (computed torque on a terminal sliding surface) and fast control (docs/paper.md sections 4 and 5)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Series elastic drive and the full-order plant (PAPER section 2).
+"""Series elastic drive and the full-order plant (docs/paper.md section 2).
 
 M1 ddq1 + C dq1 + G + K (q1 - q2) = S
 M2 ddq2 + K (q2 - q1) = U                                                                             (1)

@@ -1,4 +1,4 @@
-"""Lagrange's equations on a moving base, by automatic differentiation of two energies (PAPER sections 1 and 2).
+"""Lagrange's equations on a moving base, by automatic differentiation of two energies (docs/paper.md sections 1 and 2).
 
     M(q) ddq + C(q, dq) dq + G(q) = S + generalised forces                                                (1)
 

@@ -1,4 +1,4 @@
-"""Singular perturbation split: slow subsystem, quasi-steady spring force, fast subsystem (PAPER section 3).
+"""Singular perturbation split: slow subsystem, quasi-steady spring force, fast subsystem (docs/paper.md section 3).
 
 epsilon in (0, 1], K1 = epsilon^2 K, spring force z = K (q2 - q1), eta = z - zbar, tau = t / epsilon.
 """

@@ -1,4 +1,4 @@
-"""Terminal sliding surface and reaching laws (PAPER section 4, errata E3, E4, E8).
+"""Terminal sliding surface and reaching laws (docs/paper.md section 4, errata E3, E4, E8).
 
 A reaching law is one class with its parameters and one method; registering it in LAWS is all that is needed.
 """

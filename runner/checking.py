@@ -120,7 +120,7 @@ def _section_of_kind(
 
 
 def _exponent_problems(control: Mapping[str, Any], where: Where) -> list[Problem]:
-    """l > m and r > p (PAPER section 4)."""
+    """l > m and r > p (docs/paper.md section 4)."""
     return [
         Problem(
             where(f"control.{high}"),

@@ -62,7 +62,7 @@ def test_rk4_has_order_four(sampled: bool, shaken: Program, values_of: Values) -
 
 
 def test_closed_loop_agrees_with_cvodes(values_of: Values) -> None:
-    """PAPER's nominal run, no base motion, against CVODES at reltol 1e-10: positions, angles and link rates to 1e-5.
+    """The nominal run, no base motion, against CVODES at reltol 1e-10: positions, angles and link rates to 1e-5.
 
     Motor rates follow the springs' vibration, which the limiter's corners excite: there 1e-2 holds.
     """
