@@ -88,6 +88,8 @@ _FAST = frozenset({
 _NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
 
 
+_FORMULA_DEPTH = 4
+
 Load = Callable[[int, str], str]
 Store = Callable[[int, str, str], str]
 
@@ -151,6 +153,9 @@ class _Emitter:
             self._keep(wanted, Binding.STATE)
         self._keep(list(self.slots[Binding.VARYING]), Binding.VARYING)
         self._keep(list(self.slots[Binding.UNIFORM]), Binding.UNIFORM)
+        for binding, letter in ((Binding.RUN, "r"), (Binding.UNIFORM, "s"), (Binding.VARYING, "v")):
+            for i, k in self.slots[binding].items():
+                self.names.setdefault(i, f"{letter}{k}")
 
     def _names(self) -> dict[int, str]:
         """Names of the model for inputs, outputs and signals; everything else is numbered."""
@@ -164,12 +169,19 @@ class _Emitter:
                     names.setdefault(i, label)
 
         base = [c.symbol for c in COORDINATES]
+        symbols = {slot.key: slot.symbol for slot in system.slots}
         for i, node in enumerate(self.graph.nodes):
             kind, k = node.source
             if node.op is None and kind == "x":
                 names[i] = f"{('q1', 'dq1', 'q2', 'dq2')[k // system.n]}_{joints[k % system.n]}"
             elif node.op is None and kind == "u":
                 names[i] = f"u_{joints[k]}"
+            elif node.op is None and kind == "p":
+                names[i] = symbols[self.graph.tunable[k]]
+            elif node.op is None and kind == "t":
+                names[i] = "t"
+            elif node.op is None and kind == "d":
+                names[i] = f"d{k}"
         signal = [f"{q}_{j}" for q in ("q1d", "dq1d", "ddq1d") for j in joints]
         name(outputs["signals"][0], signal + [f"{d}{c}" for d in ("", "d_", "dd_") for c in base])
         for part, label in zip(outputs["control"], ("command", "e", "sigma"), strict=True):
@@ -221,6 +233,18 @@ class _Emitter:
 
     def _label(self, i: int, suffix: str) -> str:
         return self.names.get(i, f"a{i}") + suffix
+
+    def _formula(self, i: int, depth: int = 0) -> str:
+        """What a staged value is, in the model's names, for a comment; other staged values stand by their own."""
+        node = self.graph.nodes[i]
+        if node.binding is Binding.CONSTANT:
+            return f"{node.value:.6g}"
+        if node.op is None or (depth and (i in self.names or depth > _FORMULA_DEPTH)):
+            return self.names.get(i, "...")
+        parts = [self._formula(a, depth + 1) for a in node.arguments]
+        if node.op in _INFIX:
+            return f"({parts[0]} {_INFIX[node.op]} {parts[1]})"
+        return f"{_NAMES[node.op].removeprefix('OP_').lower()}({', '.join(parts)})"
 
     def _assumed_power(self, exponent: int) -> float | None:
         """The special exponent that a run-time exponent has at the parameters' default values, if it has one."""
@@ -377,7 +401,7 @@ class _Emitter:
         node = self.graph.nodes[i]
         name, k = node.source
         if name in ("t", "d"):
-            return "slv_set(t)" if name == "t" else f"slv_set(d[{k}])"
+            return "slv_set(time)" if name == "t" else f"slv_set(data[{k}])"
         if node.binding is Binding.UNIFORM:
             return f"slv_set(uniform[{self.slots[Binding.UNIFORM][i]} * SL_W])"
         return self._given(i, group)
@@ -385,7 +409,13 @@ class _Emitter:
     def _given_at_many_times(self, i: int, _group: str) -> str:
         """As `_given`, in the function that computes what all runs share, at SL_W times in one vector."""
         name, k = self.graph.nodes[i].source
-        return "slv_load(t)" if name == "t" else f"slv_load(d + {k} * SL_W)"
+        return "slv_load(times)" if name == "t" else f"slv_load(data + {k} * SL_W)"
+
+    def _staged(self, name: str, binding: Binding) -> Callable[[int, str], str]:
+        """Where a staged value is kept, with what it is as a comment."""
+        nodes = list(self.slots[binding])
+        indent = "    " if binding is not Binding.UNIFORM else "  "
+        return lambda k, g: f"/* {self._formula(nodes[k])} */\n{indent}{name}[{k}]" + (f"[{g}]" if g else "")
 
     def _function(
         self,
@@ -455,7 +485,13 @@ class _Emitter:
             [
                 "/* ---- once per run ---- */\n",
                 self._function(
-                    "run", "const sl_group *p, sl_group *r", run, Binding.RUN, into("r"), self._given, ["g"]
+                    "run",
+                    "const sl_group *p, sl_group *r",
+                    run,
+                    Binding.RUN,
+                    self._staged("r", Binding.RUN),
+                    self._given,
+                    ["g"],
                 ),
                 self._function(
                     "start", f"{given}, sl_group *x", outputs["start"][0], Binding.STATE, into("x"), self._given, ["g"]
@@ -463,19 +499,19 @@ class _Emitter:
                 "/* ---- once per time: for all runs, then for each ---- */\n",
                 self._function(
                     "uniform",
-                    "const double *t, const double *d, sl_v *uniform",
+                    "const double *times, const double *data, sl_v *uniform",
                     uniform,
                     Binding.UNIFORM,
-                    lambda k, _g: f"uniform[{k}]",
+                    self._staged("uniform", Binding.UNIFORM),
                     self._given_at_many_times,
-                    ["0"],
+                    [""],
                 ),
                 self._function(
                     "varying",
-                    f"double t, const double *d, const double *uniform, {given},\n    sl_group *varying",
+                    f"double time, const double *data, const double *uniform, {given},\n    sl_group *varying",
                     varying,
                     Binding.VARYING,
-                    into("varying"),
+                    self._staged("varying", Binding.VARYING),
                     self._given_at_one_time,
                     ["g"],
                 ),

@@ -1,8 +1,37 @@
 """Scenarios in, tables and figures out: `load_scenario`, `simulate`, `batch`."""
 
-# Not imported on demand: two of these functions have their submodule's name, and whichever is bound last stays.
-from springline.runner.batch import batch
-from springline.runner.scenario import load_scenario
-from springline.runner.simulate import simulate
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from springline.runner.batch import batch
+    from springline.runner.scenario import load_scenario
+    from springline.runner.simulate import simulate
 
 __all__ = ["batch", "load_scenario", "simulate"]
+
+_HOME = {"batch": "batch", "load_scenario": "scenario", "simulate": "simulate"}
+
+
+class _Package(ModuleType):
+    """The functions are imported on demand, for CasADi and Arrow take a second that `springline --help` has no use for.
+
+    Two of them have their submodule's name. The import of a submodule binds it in the package, but what a class says
+    comes before what an instance holds, so here the name is always the function.
+    """
+
+
+def _on_demand(name: str, home: str) -> property:
+    def function(_: ModuleType) -> object:
+        return getattr(import_module(f"springline.runner.{home}"), name)
+
+    return property(function, lambda _package, _submodule: None)
+
+
+for _name, _home in _HOME.items():
+    setattr(_Package, _name, _on_demand(_name, _home))
+sys.modules[__name__].__class__ = _Package

@@ -260,23 +260,36 @@ static inline SL_F SL_FN(exp_sum)(SL_F hi, SL_F lo) {
   return SL_FN(real)(SL_FN(bits)(m) + (SL_FN(bits)(t) << 52));
 }
 
+/* exp(x) - 1 = 2^k (1 + r + ...) - 1 for |x| < 708, and in *lo what its rounding left over.  s = 2^k: s - 1 and s rh
+ * are added while both are exact or nearly so. */
+static inline SL_F SL_FN(expm1_sum)(SL_F x, SL_F *lo) {
+  SL_F t = x * 0x1.71547652b82fep+0 + SL_ROUND, k = t - SL_ROUND, rh = x - k * SL_LN2_HI;
+  SL_F s = SL_FN(real)((SL_FN(bits)(t) << 52) + SL_ONE), a = (s - 1.0) + s * rh;
+  SL_F b = s * SL_FN(exp_tail)(rh, k * -SL_LN2_LO), r = a + b;
+  *lo = (a - r) + b;
+  return r;
+}
+
 #ifdef SL_SCALAR
-/* exp(hi + lo) for every hi but NaN: overflow, denormal results. */
-static inline double sl_exp_sum_rare(double hi, double lo) {
+/* 2^shift exp(hi + lo) for every hi but NaN: overflow, denormal results. */
+static inline double sl_exp_sum_rare(double hi, double lo, int shift) {
   double k, rh;
-  if (hi > 710.0) return SL_INF;
+  if (hi > 711.0) return SL_INF;
   if (hi < -746.0) return 0.0;
   k = (hi * 0x1.71547652b82fep+0 + SL_ROUND) - SL_ROUND;
   rh = hi - k * SL_LN2_HI;
-  return sl_scale(1.0 + (rh + sl_exp_tail(rh, lo - k * SL_LN2_LO)), (int)k);
+  return sl_scale(1.0 + (rh + sl_exp_tail(rh, lo - k * SL_LN2_LO)), (int)k + shift);
 }
 
-SL_RARE double sl_exp_rare(double x) { return x != x ? x : sl_exp_sum_rare(x, 0.0); }
-
-SL_RARE double sl_expm1_rare(double x) { return x != x ? x : x < 0.0 ? -1.0 : sl_exp_sum_rare(x, 0.0); }
+SL_RARE double sl_exp_rare(double x) { return x != x ? x : sl_exp_sum_rare(x, 0.0, 0); }
+SL_RARE double sl_expm1_rare(double x) { return x != x ? x : x < 0.0 ? -1.0 : sl_exp_sum_rare(x, 0.0, 0); }
+SL_RARE double sl_cosh_rare(double x) { return x != x ? x : sl_exp_sum_rare(sl_fabs(x), 0.0, -1); }
+SL_RARE double sl_sinh_rare(double x) { return sl_copysign(sl_cosh_rare(x), x); }
 #endif
 SL_DEFINE_PATCH1(exp_rare)
 SL_DEFINE_PATCH1(expm1_rare)
+SL_DEFINE_PATCH1(cosh_rare)
+SL_DEFINE_PATCH1(sinh_rare)
 #endif
 
 static inline SL_F SL_CHECKED(exp)(SL_F x SL_OK) {
@@ -287,15 +300,33 @@ static inline SL_F SL_CHECKED(exp)(SL_F x SL_OK) {
   return r;
 }
 
-/* 2^k (1 + r + ...) - 1 with s = 2^k: s - 1 and s rh are added while both are exact or nearly so. */
 static inline SL_F SL_CHECKED(expm1)(SL_F x SL_OK) {
-  SL_F t = x * 0x1.71547652b82fep+0 + SL_ROUND, k = t - SL_ROUND, rh = x - k * SL_LN2_HI;
-  SL_F s = SL_FN(real)((SL_FN(bits)(t) << 52) + SL_ONE);
-  SL_F r = ((s - 1.0) + s * rh) + s * SL_FN(exp_tail)(rh, k * -SL_LN2_LO);
-  r = SL_FN(copysign)(r, x);
+  SL_F lo, r = SL_FN(copysign)(SL_FN(expm1_sum)(x, &lo), x);
   SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, expm1_rare, x);
   return r;
 }
+
+static inline SL_F SL_CHECKED(cosh)(SL_F x SL_OK) {
+  SL_F e = SL_FN(exp_sum)(SL_FN(fabs)(x), SL_FN(set)(0.0)), r = 0.5 * e + 0.5 / e;
+  SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, cosh_rare, x);
+  return r;
+}
+
+/* (e + e / (1 + e)) / 2 with e = exp|x| - 1; lo enters times the derivative. */
+static inline SL_F SL_CHECKED(sinh)(SL_F x SL_OK) {
+  SL_F lo, e = SL_FN(expm1_sum)(SL_FN(fabs)(x), &lo), q = e / (1.0 + e);
+  SL_F r = SL_FN(copysign)(0.5 * (e + (q + lo * (1.0 + (1.0 - q) * (1.0 - q)))), x);
+  SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, sinh_rare, x);
+  return r;
+}
+
+#ifdef SL_CORES
+/* -e / (2 + e) with e = exp(-2|x|) - 1; 1 to the last bit from 30 on. */
+static inline SL_F SL_FN(tanh)(SL_F x) {
+  SL_F lo, e = SL_FN(expm1_sum)(-2.0 * SL_FN(fmin)(SL_FN(set)(30.0), SL_FN(fabs)(x)), &lo), q = e / (2.0 + e);
+  return SL_FN(copysign)(q + lo * (0.5 * (1.0 - q) * (1.0 - q)), x);
+}
+#endif
 
 /* ---- log, log1p -----------------------------------------------------------------------------------------
  * x = 2^k m with m in [sqrt(1/2), sqrt(2)), f = m - 1, s = f / (2 + f), log m = 2 atanh s. */
@@ -483,6 +514,101 @@ static inline SL_F SL_CHECKED(tan)(SL_F x SL_OK) {
   return SL_FN(select)(x == 0.0, x, SL_FN(pick)(n << 63, t, q));
 }
 
+/* ---- atan, atan2, asin, acos ---------------------------------------------------------------------------- */
+#ifdef SL_CORES
+/* The angle in [0, pi/2] whose tangent is y / x, both positive: atan c + atan t with c = 0, 1/2, 1, 3/2 or infinite,
+ * c = b / a and t = (a y - b x) / (a x + b y), |t| <= 7/16. */
+static inline SL_F SL_FN(angle)(SL_F y, SL_F x) {
+  SL_M m1 = y >= 0.4375 * x, m2 = y >= 0.6875 * x, m3 = y >= 1.1875 * x, m4 = y >= 2.4375 * x;
+  SL_F a = SL_FN(select)(m4, SL_FN(set)(0.0), SL_FN(select)(m2, SL_FN(set)(1.0), SL_FN(set)(1.0) + SL_FN(true)(m1)));
+  SL_F b = SL_FN(select)(m4, SL_FN(set)(1.0), SL_FN(select)(m3, SL_FN(set)(1.5), SL_FN(true)(m1)));
+  SL_F hi = SL_FN(if)(m1, SL_FN(set)(0x1.dac670561bb4fp-2)), lo = SL_FN(if)(m1, SL_FN(set)(0x1.a2b7f222f65e2p-56));
+  SL_F t, z, w, p;
+  hi = SL_FN(select)(m2, SL_FN(set)(0x1.921fb54442d18p-1), hi);
+  lo = SL_FN(select)(m2, SL_FN(set)(0x1.1a62633145c07p-55), lo);
+  hi = SL_FN(select)(m3, SL_FN(set)(0x1.f730bd281f69bp-1), hi);
+  lo = SL_FN(select)(m3, SL_FN(set)(0x1.007887af0cbbdp-56), lo);
+  hi = SL_FN(select)(m4, SL_FN(set)(0x1.921fb54442d18p+0), hi);
+  lo = SL_FN(select)(m4, SL_FN(set)(0x1.1a62633145c07p-54), lo);
+  t = (a * y - b * x) / (a * x + b * y);
+  z = t * t;
+  w = z * z;
+  p = (-0x1.555555555550cp-2 + z * 0x1.999999998e9bcp-3) +
+      w * ((-0x1.2492491ffcd99p-3 + z * 0x1.c71c6fde2bd99p-4) +
+           w * ((-0x1.745cdbebc1a5fp-4 + z * 0x1.3b0f2453d8041p-4) +
+                w * ((-0x1.10d625585003ep-4 + z * 0x1.dddf46d42df51p-5) +
+                     w * ((-0x1.97a61cc5ac210p-5 + z * 0x1.2b228d2b176c3p-5) + w * -0x1.0a908cd5e801ap-6))));
+  return hi + (t + (lo + t * z * p));
+}
+
+static inline SL_F SL_FN(atan)(SL_F x) {
+  return SL_FN(copysign)(SL_FN(angle)(SL_FN(fmin)(SL_FN(set)(0x1p1000), SL_FN(fabs)(x)), SL_FN(set)(1.0)), x);
+}
+
+#ifdef SL_SCALAR
+/* Infinities are compared by kind, zeros lie on an axis, everything else only needs another scale. */
+SL_RARE double sl_atan2_rare(double y, double x) {
+  double a = sl_fabs(y), b = sl_fabs(x), scale = sl_fmax(a, b) > 1.0 ? 0x1p-100 : 0x1p100, r;
+  if (x != x || y != y) return x + y;
+  if (a == SL_INF || b == SL_INF) {
+    a = sl_true(a == SL_INF);
+    b = sl_true(b == SL_INF);
+    scale = 1.0;
+  }
+  r = a == 0.0 ? 0.0 : b == 0.0 ? 0x1.921fb54442d18p+0 : sl_angle(a * scale, b * scale);
+  if ((sl_bits(x) & SL_SIGN_BIT) != 0) r = 0x1.921fb54442d18p+1 - (r - 0x1.1a62633145c07p-53);
+  return sl_copysign(r, y);
+}
+#endif
+SL_DEFINE_PATCH2(atan2_rare)
+
+/* P of asin s = s + s^3 P(s^2), 0 <= s^2 <= 1/4, times s^2 */
+static inline SL_F SL_FN(asin_tail)(SL_F z) {
+  SL_F w = z * z;
+  return z * ((0x1.5555555555384p-3 + z * 0x1.333333336fdcfp-4) +
+              w * ((0x1.6db6db419c1aep-5 + z * 0x1.f1c72c7fb16b6p-6) +
+                   w * ((0x1.6e89edb72d898p-6 + z * 0x1.1c6c42d843f7ep-6) +
+                        w * ((0x1.c6f65bee06e06p-7 + z * 0x1.8ef2e7d389800p-7) +
+                             w * ((0x1.aa363bb0cc3e7p-8 + z * 0x1.41091db8c8729p-6) +
+                                  w * (-0x1.0b7fe0b5d7d56p-6 + z * 0x1.05feb94ced0f5p-5))))));
+}
+
+/* From 1/2 on by asin x = pi/2 - 2 asin s, s = sqrt((1 - x) / 2) = sh + sl. */
+static inline SL_F SL_FN(asin)(SL_F x) {
+  SL_F a = SL_FN(fabs)(x), z, s, sh, sl, tail, p, q;
+  SL_M small = a < 0.5;
+  z = SL_FN(select)(small, a * a, 0.5 * (1.0 - a));
+  s = SL_FN(sqrt)(z);
+  sh = SL_FN(real)(SL_FN(bits)(s) & SL_HIGH_26);
+  sl = (z - sh * sh) / SL_FN(fmax)(SL_FN(set)(DBL_MIN), s + sh);
+  tail = SL_FN(asin_tail)(z);
+  p = 2.0 * s * tail - (0x1.1a62633145c07p-54 - 2.0 * sl);
+  q = 0x1.921fb54442d18p-1 - 2.0 * sh;
+  return SL_FN(copysign)(SL_FN(select)(small, a + a * tail, 0x1.921fb54442d18p-1 - (p - q)), x);
+}
+
+static inline SL_F SL_FN(acos)(SL_F x) {
+  SL_F a = SL_FN(fabs)(x), z, s, sh, sl, tail, w, r;
+  SL_M small = a < 0.5;
+  z = SL_FN(select)(small, a * a, 0.5 * (1.0 - a));
+  s = SL_FN(sqrt)(z);
+  sh = SL_FN(real)(SL_FN(bits)(s) & SL_HIGH_26);
+  sl = (z - sh * sh) / SL_FN(fmax)(SL_FN(set)(DBL_MIN), s + sh);
+  tail = SL_FN(asin_tail)(z);
+  w = s * tail;
+  r = SL_FN(select)(x < 0.0, 0x1.921fb54442d18p+0 - (s + (w - 0x1.1a62633145c07p-54)), sh + (w + sl));
+  return SL_FN(select)(small, 0x1.921fb54442d18p+0 - (x - (0x1.1a62633145c07p-54 - x * tail)), r + r);
+}
+#endif
+
+static inline SL_F SL_CHECKED(atan2)(SL_F y, SL_F x SL_OK) {
+  SL_F a = SL_FN(fabs)(y), b = SL_FN(fabs)(x), r = SL_FN(angle)(a, b);
+  r = SL_FN(select)(x < 0.0, 0x1.921fb54442d18p+1 - (r - 0x1.1a62633145c07p-53), r);
+  r = SL_FN(copysign)(r, y);
+  SL_PATCH2((a > 0x1p-1000) & (a < 0x1p1000) & (b > 0x1p-1000) & (b < 0x1p1000), r, atan2_rare, y, x);
+  return r;
+}
+
 /* ---- the cube-root family -------------------------------------------------------------------------------
  * y ~ x^(-1/3) from the bits of x divided by -3 (in floating point: lanes have no 64-bit division), one step of
  * third order, then cut to 17 bits so that y^3 is exact: x^(-1/3) = y (1 + d), d from h = 1 - x y^3. */
@@ -667,7 +793,7 @@ SL_RARE double sl_pow_rare(double x, double y) {
       bias += 54.0;
     }
     sl_pow_log(sl_bits(a) - SL_POW_START, y, bias, &hi, &lo);
-    r = sl_exp_sum_rare(hi, lo);
+    r = sl_exp_sum_rare(hi, lo, 0);
   }
   return parity == 1 ? sl_copysign(r, x) : r;
 }

@@ -1,0 +1,386 @@
+"""Many runs: chunks of them over threads or a cluster, each finished one into the dataset.
+
+A Pool takes chunks as futures of concurrent.futures, whether its threads are here or on a cluster; what happens to a
+chunk afterwards is the same code. No more chunks are under way than keep the pool busy, so memory does not grow with
+the sweep.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import platform
+import signal
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field, replace
+from importlib import import_module, metadata
+from typing import Any, Protocol
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import ArrayLike, NDArray
+
+from springline.codegen.kernel import Control, Runs
+from springline.codegen.toolchain import ToolchainError
+from springline.runner.dataset import Dataset
+from springline.runner.errors import InputError, Problem
+from springline.runner.plan import Chunk, Columns, Plan
+from springline.runner.scenario import Scenario
+from springline.runner.simulate import field as unit_field
+from springline.runner.simulate import metrics_table, trajectory_schema
+from springline.runner.terminal import version
+from springline.runner.work import Outcome, Work, parcel, perform, perform_parcel, work_for
+
+Floats = NDArray[np.float64]
+
+_ATTEMPTS = 3
+_IN_A_ROW = 3
+_PAUSE = 0.5
+_REFRESH = 0.2
+_CALIBRATION_STEPS = 2000
+_CHUNKS_PER_THREAD = 8
+
+
+# --- where runs are simulated ----------------------------------------------------------------------------
+
+
+class Pool(Protocol):
+    """Where chunks are simulated."""
+
+    @property
+    def threads(self) -> int:
+        """How many chunks are simulated at a time."""
+        ...
+
+    def submit(self, work: Work, parameters: Floats, kept: Sequence[int]) -> Future[Outcome]:
+        """Begin a chunk."""
+        ...
+
+    def underway(self) -> int:
+        """Steps times runs that were simulated so far, as far as is known before chunks end."""
+        ...
+
+    def stop(self) -> None:
+        """Give up what is under way, soon."""
+        ...
+
+
+class Threads:
+    """Threads of this process: the loop holds no lock and shares nothing."""
+
+    def __init__(self, jobs: int) -> None:
+        self.threads = jobs
+        self._executor = ThreadPoolExecutor(jobs, thread_name_prefix="springline")
+        self._control = Control()
+
+    def submit(self, work: Work, parameters: Floats, kept: Sequence[int]) -> Future[Outcome]:
+        """Begin a chunk in a free thread."""
+        return self._executor.submit(self._perform, work, parameters, kept)
+
+    def _perform(self, work: Work, parameters: Floats, kept: Sequence[int]) -> Outcome:
+        return perform(work.kernel(), work.settings, work.tables, parameters, kept, self._control)
+
+    def underway(self) -> int:
+        """Steps times runs, a few thousand steps behind."""
+        return int(self._control.progress.value)
+
+    def stop(self) -> None:
+        """Chunks under way end within some thousand steps; their results count for nothing."""
+        self._control.stop.value = 1
+        self._executor.shutdown(wait=True, cancel_futures=True)
+
+
+class Cluster:
+    """Workers of dask.distributed, which compile the kernel from the sources they are sent."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._executor: Executor = client.get_executor(pure=False)
+        self._threads = (0.0, 1)
+
+    @property
+    def threads(self) -> int:
+        """Threads of all workers there are now."""
+        asked, count = self._threads
+        if time.monotonic() - asked > 1.0:
+            count = max(1, sum(self._client.nthreads().values()))
+            self._threads = time.monotonic(), count
+        return count
+
+    def submit(self, work: Work, parameters: Floats, kept: Sequence[int]) -> Future[Outcome]:
+        """Send a chunk to a worker."""
+        return self._executor.submit(perform_parcel, parcel(work), parameters, list(kept))
+
+    def underway(self) -> int:
+        """Nothing: workers report whole chunks."""
+        return 0
+
+    def stop(self) -> None:
+        """Drop what is under way."""
+        self._executor.shutdown(wait=False)
+
+
+@contextlib.contextmanager
+def open_pool(jobs: int | None = None, scheduler: str = "") -> Iterator[Pool]:
+    """The pool that the user asked for; whatever ends the context ends the pool.
+
+    jobs       threads, None for one per processor that this process may use
+    scheduler  "" for threads here, "tcp://host:port" for a dask scheduler, "local:N" for N worker processes here
+    Raises InputError if the address is none or nobody answers there.
+    """
+    if not scheduler:
+        threads = Threads(jobs or processors())
+        try:
+            yield threads
+        finally:
+            threads.stop()
+        return
+    with contextlib.ExitStack() as stack:
+        cluster = Cluster(_client(scheduler, stack))
+        try:
+            yield cluster
+        finally:
+            cluster.stop()
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _client(scheduler: str, stack: contextlib.ExitStack) -> Any:
+    """A client of the scheduler at an address, or of one that is started here."""
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError as error:
+        hint = "needs dask.distributed: pip install 'springline[distributed]'"
+        raise InputError(Problem("--scheduler", "", hint, scheduler)) from error
+    kind, _, count = scheduler.partition(":")
+    if kind == "local":
+        if not count.isdecimal() or int(count) < 1:
+            raise InputError(Problem("--scheduler", "", "expected local:N with N >= 1 worker processes", scheduler))
+        with _ignoring_interrupts():
+            address: Any = stack.enter_context(
+                distributed.LocalCluster(n_workers=int(count), threads_per_worker=1, dashboard_address=None)
+            )
+    elif "://" in scheduler:
+        address = scheduler
+    else:
+        raise InputError(Problem("--scheduler", "", 'expected an address ("tcp://host:port") or local:N', scheduler))
+    try:
+        return stack.enter_context(distributed.Client(address, timeout="10s"))
+    except (OSError, ValueError) as error:
+        raise InputError(Problem("--scheduler", "", f"no scheduler answers ({error})", scheduler)) from error
+
+
+@contextlib.contextmanager
+def _ignoring_interrupts() -> Iterator[None]:
+    """Processes that are started here inherit that Ctrl-C is not for them: this one tells them when to end."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+# --- a sweep ---------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Tally:
+    """How a sweep stands. Runs are counted by what became of them; `failures` tells why chunks failed."""
+
+    runs: int
+    found: int = 0
+    done: int = 0
+    diverged: int = 0
+    failed: int = 0
+    steps: int = 0
+    failures: list[str] = field(default_factory=list)
+
+    @property
+    def left(self) -> int:
+        """Runs that no part holds."""
+        return self.runs - self.found - self.done
+
+
+Report = Callable[[Tally, int], None]
+"""Called several times a second with the tally and the steps times runs that are done, chunks under way included."""
+
+
+def run_sweep(
+    plan: Plan, dataset: Dataset, pool: Pool, done: set[int], report: Report = lambda tally, steps: None
+) -> Tally:
+    """Simulate every chunk of the plan that is not among `done`, and store it.
+
+    A chunk that fails (its worker died, the disk refuses) is tried three times, then given up, and the rest goes on,
+    unless three chunks in a row were given up. Raises ToolchainError where the kernel cannot be compiled.
+    """
+    tally = Tally(plan.runs, found=sum(plan.chunk(k).runs for k in done))
+    todo = (k for k in range(plan.chunks) if k not in done)
+    pending: dict[Future[Outcome], tuple[Chunk, Columns, int]] = {}
+    in_a_row = 0
+
+    def submit(chunk: Chunk, columns: Columns, attempt: int) -> None:
+        parameters, kept = plan.parameters(chunk, columns), plan.kept(chunk)
+        try:
+            future = pool.submit(chunk.group.work, parameters, kept)
+        except (OSError, RuntimeError) as error:  # the pool itself is gone: the chunk fails like any other
+            future = Future()
+            future.set_exception(error)
+        pending[future] = chunk, columns, attempt
+
+    while in_a_row < _IN_A_ROW:
+        while len(pending) < 2 * pool.threads and (number := next(todo, None)) is not None:
+            chunk = plan.chunk(number)
+            submit(chunk, plan.columns(chunk), 1)
+        if not pending:
+            break
+        ended, _ = wait(pending, timeout=_REFRESH, return_when=FIRST_COMPLETED)
+        for future in ended:
+            chunk, columns, attempt = pending.pop(future)
+            try:
+                outcome = future.result()
+            except ToolchainError:
+                raise
+            except Exception as error:  # whatever it was, the tally tells it
+                if attempt < _ATTEMPTS:
+                    submit(chunk, columns, attempt + 1)
+                    continue
+                problem: Exception | None = error
+            else:
+                problem = _store(plan, dataset, chunk, columns, outcome)
+                if problem is None:
+                    tally.done += chunk.runs
+                    tally.diverged += int(np.count_nonzero(outcome.runs.status))
+            tally.steps += chunk.runs * chunk.group.work.settings.steps
+            in_a_row = 0 if problem is None else in_a_row + 1
+            if problem is not None:
+                tally.failed += chunk.runs
+                last = chunk.first + chunk.runs - 1
+                tally.failures.append(f"runs {chunk.first} to {last}: {type(problem).__name__}: {problem}")
+        report(tally, max(tally.steps, pool.underway()))
+    return tally
+
+
+def _store(plan: Plan, dataset: Dataset, chunk: Chunk, columns: Columns, outcome: Outcome) -> Exception | None:
+    """Write a chunk's part; what went wrong if the place refuses again and again."""
+    table = plan.table(chunk, columns, outcome)
+    schema = trajectory_schema(chunk.group.work.system)
+    trajectories = {
+        chunk.first + index: pa.Table.from_arrays([pa.array(column) for column in rows.T], schema=schema)
+        for index, rows in zip(plan.kept(chunk), outcome.trajectories, strict=True)
+    }
+    problem: Exception | None = None
+    for attempt in range(_ATTEMPTS):
+        try:
+            dataset.write_part(chunk, table, trajectories)
+        except OSError as error:
+            problem = error
+            if attempt + 1 < _ATTEMPTS:
+                time.sleep(_PAUSE * (attempt + 1))
+        else:
+            return None
+    return problem
+
+
+def versions() -> dict[str, Any]:
+    """What made a dataset, for its description."""
+    libraries = {name: metadata.version(name) for name in ("casadi", "numpy", "pyarrow", "scipy")}
+    return {"springline": version(), "versions": {"python": platform.python_version(), **libraries}}
+
+
+# --- what it will cost -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What a sweep will take: seconds of simulation with the threads there are, bytes of the dataset."""
+
+    seconds: float
+    bytes: int
+
+
+def estimate(plan: Plan, threads: int, left: int | None = None) -> Estimate:
+    """Time the first pack of each kind of work on this machine, and multiply.
+
+    threads  how many work at a time;  left  runs that are not done yet, None for all
+    Raises ToolchainError where there is no compiler.
+    """
+    rates: dict[int, float] = {}
+    seconds = 0.0
+    for group in plan.groups:
+        key = id(group.work)
+        if key not in rates:
+            rates[key] = _seconds_per_step(plan, group.number)
+        seconds += rates[key] * group.runs * group.work.settings.steps
+    share = 1.0 if left is None else left / plan.runs
+    return Estimate(share * seconds / threads, dataset_bytes(plan))
+
+
+def _seconds_per_step(plan: Plan, group: int) -> float:
+    """Seconds for one step of one run among a full pack, measured over a short run."""
+    chunk = plan.chunk_of(plan.groups[group].first)
+    work = chunk.group.work
+    loop = work.kernel()
+    parameters = np.resize(plan.parameters(chunk, plan.columns(chunk)), (2 * loop.width, len(work.parameters)))
+    steps = min(work.settings.steps, _CALIBRATION_STEPS)
+    settings = replace(work.settings, steps=steps, output_every=0)
+    best = float("inf")
+    for _ in range(2):
+        start = time.perf_counter()
+        loop.run(parameters, settings, work.tables)
+        best = min(best, time.perf_counter() - start)
+    return best / (len(parameters) * steps)
+
+
+def dataset_bytes(plan: Plan) -> int:
+    """About how large the dataset will be: doubles hardly compress, and every part and trajectory has a footer."""
+    footer = 600 * len(plan.schema)
+    size = plan.runs * 8 * len(plan.schema) + plan.chunks * footer
+    if plan.sweep.keep:
+        group = plan.groups[0].work
+        rows, columns = group.settings.rows, len(trajectory_schema(group.system))
+        size += -(-plan.runs // plan.sweep.keep) * (8 * rows + 600) * columns
+    return size
+
+
+# --- from Python -----------------------------------------------------------------------------------------
+
+
+def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | None = None) -> pa.Table:
+    """Simulate one run per entry of the arrays in `columns`, all threads at work, without trajectories.
+
+    columns  dotted key -> values, all of one length; every other number is the scenario's and becomes a constant of
+             the kernel (compiled on first use, then cached)
+    jobs     threads, None for one per processor
+    Returns a table with one row a run: run, the varied keys, every metric, status, t_end. It does not depend on `jobs`.
+    Raises InputError for an unknown key or a value out of bounds, ValueError for arrays of different lengths.
+    """
+    arrays = {key: np.atleast_1d(np.asarray(values, dtype=np.float64)) for key, values in columns.items()}
+    lengths = {key: len(values) for key, values in arrays.items()}
+    if len(set(lengths.values())) != 1 or 0 in lengths.values():
+        raise ValueError(f"the columns of a batch must be non-empty arrays of one length, got {lengths}")
+    values = scenario.values_for(arrays)
+    slots = scenario.system().slots
+    tunable = [slots[i].key for i in np.flatnonzero((values != values[0]).any(axis=0))]
+    work = work_for(scenario, tunable, values[0])
+    result = metrics_table(work.system.joints, _over_threads(work, work.chosen(values), jobs))
+    keys = scenario.numeric_keys()
+    for position, (key, array) in enumerate(arrays.items()):
+        result = result.add_column(position, unit_field(key, keys[key].unit), pa.array(array))
+    return result.add_column(0, unit_field("run", "", pa.int64()), pa.array(np.arange(len(values))))
+
+
+def _over_threads(work: Work, parameters: Floats, jobs: int | None) -> Runs:
+    """The runs of a Work, in whole packs over the threads of this process."""
+    width = work.kernel().width
+    with open_pool(jobs) as pool:
+        packs = -(-len(parameters) // width)
+        size = width * max(1, packs // (_CHUNKS_PER_THREAD * pool.threads))
+        futures = [pool.submit(work, parameters[i : i + size], ()) for i in range(0, len(parameters), size)]
+        parts = [future.result().runs for future in futures]
+    names = ("metrics", "final_state", "end_time", "status", "quantity")
+    return Runs(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

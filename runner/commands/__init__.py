@@ -1,0 +1,1 @@
+"""The commands of `springline`, one module each; cli.py registers them. Heavy imports stay inside the functions."""

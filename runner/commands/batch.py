@@ -1,0 +1,254 @@
+"""`springline batch` and `springline replay`: a sweep into a dataset, and one of its runs again."""
+
+# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from springline.runner.terminal import complain, console, print_json, print_table, say
+
+if TYPE_CHECKING:
+    from springline.runner.batch import Estimate, Pool, Report, Tally
+    from springline.runner.dataset import Dataset
+    from springline.runner.plan import Plan
+
+_LONG = 3600.0
+_LARGE = 10e9
+
+
+def batch(
+    sweep: Annotated[str, typer.Argument(help="A TOML file, or a packaged sweep: stability_map.")],
+    output: Annotated[
+        str,
+        typer.Option(
+            "-o", "--output", metavar="DIR", show_default="results/SWEEP", help="Folder or URL of the dataset."
+        ),
+    ] = "",
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", min=1, show_default="one per processor", help="Threads.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Do what is missing in a dataset that was begun.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be done and how long it takes.")] = False,
+    scheduler: Annotated[
+        str,
+        typer.Option(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="A dask scheduler, tcp://host:port, or local:N for N worker processes here.",
+        ),
+    ] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Print what became of the runs as JSON.")] = False,
+) -> None:
+    """Simulate every run of a sweep; write a table with one row a run, and a summary.
+
+    Ctrl-C, and even a crash, loses no more than the runs under way: --resume goes on from there.
+    """
+    from springline.runner.batch import estimate, open_pool, run_sweep, versions
+    from springline.runner.dataset import Dataset, place
+    from springline.runner.plan import Plan
+    from springline.runner.sweep import load_sweep
+
+    loaded = load_sweep(sweep)
+    plan = Plan(loaded)
+    destination = output or str(Path("results", Path(sweep).stem))
+    dataset = Dataset(place(destination))
+    dataset.is_begun(resume=resume)
+    if dry_run:
+        with open_pool(jobs, scheduler) as pool:
+            cost = estimate(plan, pool.threads)
+            _describe(plan, cost, pool, destination, as_json=as_json)
+        return
+    again = shlex.join(["springline", "batch", sweep, "-o", destination, "--resume"])
+    with dataset.place.locked():
+        plan = dataset.begin(plan, versions(), resume=resume)
+        done = dataset.done(plan)
+        try:
+            with open_pool(jobs, scheduler) as pool:
+                _warn(estimate(plan, pool.threads, plan.runs - sum(plan.chunk(k).runs for k in done)), again)
+                with _progress(plan, quiet=as_json) as report:
+                    tally = run_sweep(plan, dataset, pool, done, report)
+        except KeyboardInterrupt as error:
+            held = sum(plan.chunk(k).runs for k in dataset.done(plan))
+            complain(f"stopped: {held:,} of {plan.runs:,} runs are stored; continue with: {again}")
+            raise typer.Exit(130) from error
+        _finish(plan, dataset, tally, again, as_json=as_json)
+
+
+def _describe(plan: Plan, cost: Estimate, pool: Pool, destination: str, *, as_json: bool) -> None:
+    """What --dry-run prints."""
+    facts = {
+        "runs": plan.runs,
+        "groups": len(plan.groups),
+        "chunks": plan.chunks,
+        "chunk": plan.chunk_size,
+        "threads": pool.threads,
+        "bytes": cost.bytes,
+        "seconds": cost.seconds,
+    }
+    if as_json:
+        print_json("batch", [facts], {"bytes": "B", "seconds": "s"})
+        return
+    rows = [
+        ["runs", f"{plan.runs:,}"],
+        ["groups", f"{len(plan.groups)}"],
+        ["chunks", f"{plan.chunks:,} of {plan.chunk_size:,} runs"],
+        ["threads", f"{pool.threads}"],
+        ["size", f"about {size_text(cost.bytes)} in {destination}"],
+        ["time", f"about {time_text(cost.seconds)}, less where runs diverge"],
+    ]
+    print_table(["sweep", plan.sweep.source], rows)
+
+
+def _warn(cost: Estimate, again: str) -> None:
+    if cost.seconds > _LONG or cost.bytes > _LARGE:
+        complain(
+            f"this will take about {time_text(cost.seconds)} and {size_text(cost.bytes)}; Ctrl-C ends it, and then "
+            f"{again} goes on"
+        )
+
+
+def _finish(plan: Plan, dataset: Dataset, tally: Tally, again: str, *, as_json: bool) -> None:
+    """Summary and last words; exits with 1 if runs are missing."""
+    from springline.runner.summary import metric_rows, outcome_rows, summarize, worst_rows
+
+    if tally.found + tally.done:
+        summary = summarize(plan, dataset)
+        write_summary(plan, dataset, summary)
+        if as_json:
+            rows = [{"group": name, **counts} for name, counts in summary.outcomes.items()]
+            print_json("batch", rows, {}, "ok" if tally.left == 0 else "failed")
+        else:
+            for header, rows_of_text in (
+                outcome_rows(summary),
+                metric_rows(summary),
+                worst_rows(summary, [axis.key for axis in plan.sweep.axes]),
+            ):
+                print_table(header, rows_of_text, right=header[1:])
+    if tally.left:
+        for failure in tally.failures:
+            complain(f"failed: {failure}")
+        complain(f"{tally.left:,} of {plan.runs:,} runs are missing; once the cause is gone: {again}")
+        raise typer.Exit(1)
+    if not as_json:
+        say(f"results: {dataset.place.name}")
+
+
+def write_summary(plan: Plan, dataset: Dataset, summary: Any) -> None:
+    """summary.md and its figures beside the parts."""
+    from springline.runner.plots import figure_files
+    from springline.runner.summary import markdown
+    from springline.runner.sweep_plots import summary_figures
+
+    names = []
+    for name, figure in summary_figures(plan, summary).items():
+        for file, content in figure_files(name, figure).items():
+            dataset.place.write(file, content)
+        names.append(f"{name}.png")
+    title = Path(plan.sweep.source).stem
+    dataset.place.write("summary.md", markdown(plan, summary, names, title).encode())
+
+
+@contextmanager
+def _progress(plan: Plan, *, quiet: bool) -> Iterator[Report]:
+    """A bar with runs/s, what became of the runs and the time left, where somebody watches."""
+    if quiet or not sys.stdout.isatty():
+        yield lambda tally, steps: None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    total = sum(group.runs * group.work.settings.steps for group in plan.groups)
+    bar = Progress(
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TextColumn("{task.fields[counts]}"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console(),
+        transient=True,
+    )
+    start = time.monotonic()
+    with bar:
+        task = bar.add_task("", total=total, counts="")
+
+        def report(tally: Tally, steps: int) -> None:
+            per_run = total / plan.runs
+            rate = steps / per_run / max(time.monotonic() - start, 1e-9)
+            counts = (
+                f"{rate:,.0f} runs/s · {tally.found + tally.done:,} done · {tally.failed:,} failed · "
+                f"{tally.diverged:,} diverged"
+            )
+            bar.update(task, completed=tally.found * per_run + steps, counts=counts)
+
+        yield report
+
+
+def replay(
+    dataset: Annotated[str, typer.Argument(help="Folder or URL that `springline batch` wrote.")],
+    run: Annotated[int, typer.Argument(min=0, help="Number of the run, as in the column `run`.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", show_default="results/DATASET-RUN", help="Folder for the results."
+        ),
+    ] = None,
+    plot: Annotated[bool, typer.Option(" /--no-plot", show_default=False, help="Draw no figures.")] = True,
+    force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
+) -> None:
+    """Simulate one run of a dataset again, with its trajectory and figures.
+
+    The metrics must come out as the dataset has them, to the last bit; if they do not, the exit code is 1.
+    """
+    from springline.runner.commands.run import OUTPUTS, print_metrics, refuse_occupied
+    from springline.runner.dataset import Dataset, place
+    from springline.runner.plots import figure_files, run_figures
+    from springline.runner.replay import differences, recorded, replayed
+    from springline.runner.simulate import simulate
+    from springline.runner.storage import table_files, write_folder
+
+    source = Dataset(place(dataset))
+    folder = output or Path("results", f"{Path(dataset).name}-{run}")
+    refuse_occupied(folder, force=force)
+    scenario = replayed(source, run)
+    row = recorded(source, run)
+    result = simulate(scenario)
+    files = {"scenario.toml": scenario.to_toml().encode()}
+    if plot:
+        for name, figure in run_figures(scenario, result).items():
+            files |= figure_files(f"figures/{name}", figure)
+    files |= table_files("trajectory", result.trajectory)
+    files |= table_files("metrics", result.metrics)
+    write_folder(folder, files, replaces=OUTPUTS)
+    print_metrics(result, scenario.system().joints)
+    say(result.message)
+    say(f"results: {folder}")
+    wrong = differences(row, result.metrics)
+    if wrong:
+        complain("the metrics are not those of the dataset:\n  " + "\n  ".join(wrong))
+        raise typer.Exit(1)
+    say("the metrics are those of the dataset, bit for bit")
+
+
+def time_text(seconds: float) -> str:
+    """A duration for people: "40 s", "12 min", "3.5 h", "2.1 days"."""
+    scales = ((90.0, 1.0, "s"), (5400.0, 60.0, "min"), (172800.0, 3600.0, "h"), (math.inf, 86400.0, "days"))
+    unit, name = next((unit, name) for limit, unit, name in scales if seconds < limit)
+    return f"{seconds / unit:.2g} {name}" if seconds / unit < 10 else f"{seconds / unit:.0f} {name}"
+
+
+def size_text(count: float) -> str:
+    """Bytes for people: "12 kB", "3.4 GB"."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.3g} TB"

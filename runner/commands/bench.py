@@ -1,0 +1,72 @@
+"""`springline bench`: the closed loop side by side with what one would use instead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from springline.runner.errors import InputError, Problem
+from springline.runner.terminal import print_json, print_table, progress, say
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from springline.benchmarks.problem import Contender
+
+
+def bench(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for bench.json and the bar chart.")
+    ] = Path("results/bench"),
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer and shorter samples, and no compile times: for a first look.")
+    ] = False,
+    only: Annotated[
+        str, typer.Option(metavar="NAMES", help="Only contenders whose name contains one of these, comma-separated.")
+    ] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
+) -> None:
+    """Measure springline and its alternatives on this machine: time, agreement, compile time.
+
+    Exit code 1 if a contender's result differs from springline's by more than its tolerance.
+    """
+    from springline.benchmarks.contenders import CONTENDERS
+    from springline.benchmarks.harness import QUICK, UNITS, Effort, measure
+    from springline.runner.bench import COLUMNS, OUTPUTS, files, machine_lines, plain, table
+    from springline.runner.storage import write_folder
+
+    if output.exists() and not output.is_dir():
+        raise InputError(Problem(str(output), "", "is a file where a folder was expected; choose another with -o"))
+    chosen = _chosen(only, CONTENDERS)
+    with progress("measuring", quiet=as_json) as report:
+        result = measure(QUICK if quick else Effort(), chosen, report)
+    write_folder(output, files(result), replaces=OUTPUTS)
+    if as_json:
+        print_json("bench", [plain(row) for row in result.rows], UNITS, "ok" if result.agreed else "failed")
+    else:
+        print_table(COLUMNS, table(result.rows), right=COLUMNS[2:])
+        for line in machine_lines(result):
+            say(line)
+        say(f"results: {output}")
+    if not result.agreed:
+        raise typer.Exit(1)
+
+
+def _chosen(only: str, contenders: Sequence[Contender]) -> list[Contender]:
+    """Contenders whose name contains one of the comma-separated words, and springline's defaults, the measure of all."""
+    from springline.benchmarks.contenders.ours import is_default
+
+    words = [word.strip().lower() for word in only.split(",") if word.strip()] or [""]
+    names = tuple(dict.fromkeys(contender.name for contender in contenders))
+    unknown = [word for word in words if not any(word in name.lower() for name in names)]
+    if unknown:
+        raise InputError(
+            *(Problem("--only", "", "must be part of a contender's name", word, word, names) for word in unknown)
+        )
+    return [
+        contender
+        for contender in contenders
+        if is_default(contender) or any(word in contender.name.lower() for word in words)
+    ]

@@ -1,0 +1,127 @@
+"""`springline list`: what there is to choose from, with units, defaults and meaning."""
+
+# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from springline.runner.terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from springline.model.parameters import Joint, Parameter
+
+Row = dict[str, Any]
+
+
+class What(StrEnum):
+    """The lists."""
+
+    mechanisms = "mechanisms"
+    laws = "laws"
+    parameters = "parameters"
+    scenarios = "scenarios"
+
+
+def list_(
+    what: Annotated[What, typer.Argument(help="Which list.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
+) -> None:
+    """List mechanisms, reaching laws, parameters or packaged scenarios."""
+    rows = {"mechanisms": mechanisms, "laws": laws, "parameters": parameters, "scenarios": scenarios}[what.value]()
+    if as_json:
+        print_json("list", rows, {})
+        return
+    columns = list(rows[0])
+    print_table(columns, [[_text(row[column]) for column in columns] for row in rows])
+
+
+def mechanisms() -> list[Row]:
+    """Every mechanism with its joints and parameters."""
+    from springline.model.mechanisms import MECHANISMS
+
+    return [
+        {
+            "name": mechanism.name,
+            "joints": [f"{joint.name} [{joint.unit}]" for joint in mechanism.joints],
+            "parameters": [
+                item.name for item in (*mechanism.parameters, *mechanism.motor_inertia, *mechanism.stiffness)
+            ],
+        }
+        for mechanism in MECHANISMS.values()
+    ]
+
+
+def laws() -> list[Row]:
+    """Every reaching law with its parameters."""
+    from springline.model.sliding import LAWS
+
+    return [
+        {"name": law.name, "title": law.title, "parameters": [item.name for item in law.parameters]}
+        for law in LAWS.values()
+    ]
+
+
+def parameters() -> list[Row]:
+    """Every parameter of mechanism, drive and controller: scenario key, unit, default, bounds, meaning.
+
+    What differs from joint to joint has a list of defaults, and of units.
+    """
+    from springline.model.drive import EPSILON
+    from springline.model.mechanisms import MECHANISMS
+    from springline.model.system import control_parameters
+
+    rows: dict[str, Row] = {}
+    for mechanism in MECHANISMS.values():
+        tables = {
+            "mechanism": mechanism.parameters,
+            "drive": (*mechanism.motor_inertia, *mechanism.stiffness, EPSILON),
+            "control": control_parameters(),
+        }
+        for table, declared in tables.items():
+            for row in _rows(table, declared, mechanism.joints):
+                rows.setdefault(row["key"], row)
+    return list(rows.values())
+
+
+def scenarios() -> list[Row]:
+    """Every packaged scenario with the comment that it begins with."""
+    from importlib import resources
+
+    from springline.runner.scenario import packaged_scenarios
+
+    folder = resources.files("springline.runner") / "scenarios"
+    return [
+        {"name": name, "title": _title(folder.joinpath(*f"{name}.toml".split("/")).read_text("utf-8"))}
+        for name in packaged_scenarios()
+    ]
+
+
+def _title(text: str) -> str:
+    first = text.partition("\n")[0]
+    return first.lstrip("# ") if first.startswith("#") else ""
+
+
+def _rows(table: str, declared: tuple[Parameter, ...], joints: tuple[Joint, ...]) -> Iterator[Row]:
+    from springline.runner.schema import unit_text
+
+    for item in declared:
+        units = [item.unit_of(joint) for joint in joints] if item.per_joint else [unit_text(item.unit, joints)]
+        yield {
+            "key": f"{table}.{item.name}",
+            "unit": units[0] if len(set(units)) == 1 else units,
+            "default": list(item.default) if isinstance(item.default, tuple) else item.default,
+            "bounds": str(item.bounds),
+            "meaning": item.meaning,
+        }
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(_text(item) for item in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,56 @@
+"""`springline reproduce`: the paper again, number by number."""
+
+# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from springline.runner.commands.run import refuse_files
+from springline.runner.errors import InputError, unknown
+from springline.runner.terminal import number, print_json, print_table, progress, say
+
+
+def reproduce(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the report.")] = Path(
+        "reproduction"
+    ),
+    group: Annotated[
+        list[int] | None,
+        typer.Option("--group", metavar="N", help="A group of Table 2 alone. May be given again.", show_default="all"),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print Table 4 as JSON.")] = False,
+) -> None:
+    """Repeat the reference paper: its runs, tables, figures and claims, in one report.
+
+    A claim that fails is a result too, and the exit code is 0.
+    """
+    from springline.runner.paper import reproduce as repeat
+    from springline.runner.paper_cases import GROUPS
+
+    known = [str(item) for item in GROUPS]
+    wrong = [str(item) for item in group or [] if str(item) not in known]
+    if wrong:
+        raise InputError(*(unknown("springline reproduce", "--group", "group", item, known) for item in wrong))
+    refuse_files(output)
+    with progress("reproducing the paper", quiet=as_json) as report:
+        done = repeat(output, group, progress=report)
+    if as_json:
+        print_json("reproduce", done.table, {})
+        return
+    rows = [
+        [
+            f"{row['group']} {row['case']}",
+            row["joint"],
+            row["measure"].replace("_", " "),
+            number(row["printed"], row["unit"]),
+            number(row["value"], row["unit"]),
+        ]
+        for row in done.table
+    ]
+    print_table(["run", "joint", "measure", "paper", "here"], rows, right=("paper", "here"))
+    print_table(["", "claim", "verdict"], [[str(f.number), f.claim, f.verdict] for f in done.findings])
+    say(f"report: {done.report}")

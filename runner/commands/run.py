@@ -1,0 +1,150 @@
+"""`springline run`: one scenario simulated, its tables and figures in a folder."""
+
+# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from springline.runner.errors import InputError, Problem
+from springline.runner.terminal import number, print_json, print_table, progress, say
+
+if TYPE_CHECKING:
+    from springline.model.parameters import Joint
+    from springline.runner.scenario import Scenario
+    from springline.runner.simulate import Result
+
+OUTPUTS = (
+    "scenario.toml",
+    *(f"{table}.{form}" for table in ("trajectory", "metrics") for form in ("parquet", "csv", "units.json")),
+    "figures/*.png",
+    "figures/*.svg",
+)
+"""What a run leaves in its folder, as glob patterns."""
+
+
+class Engine(StrEnum):
+    """Which C computes a run; the results are the same to the last bit."""
+
+    lanes = "lanes"
+    casadi = "casadi"
+
+
+class Format(StrEnum):
+    """How tables are stored."""
+
+    parquet = "parquet"
+    csv = "csv"
+
+
+def run(
+    scenario: Annotated[str, typer.Argument(help="A TOML file, or a packaged scenario: paper/group1_shake.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", show_default="results/SCENARIO", help="Folder for the results."),
+    ] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help=("Override a key of the scenario, the value as in TOML: control.delta=0.02. May be given again."),
+        ),
+    ] = None,
+    engine: Annotated[Engine, typer.Option(help="The engine.")] = Engine.lanes,
+    form: Annotated[Format, typer.Option("--format", help="Format of the tables.")] = Format.parquet,
+    plot: Annotated[bool, typer.Option(" /--no-plot", show_default=False, help="Draw no figures.")] = True,
+    force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
+) -> None:
+    """Simulate one scenario; write its trajectory, metrics and figures.
+
+    A run that diverges is a result: it is reported with the quantity and the time, and the exit code is 0.
+    """
+    from springline.runner.scenario import load_scenario, parse_set
+    from springline.runner.simulate import simulate
+    from springline.runner.storage import table_files, units, write_folder
+
+    loaded = load_scenario(scenario, dict(parse_set(change) for change in changes or []))
+    folder = output or Path("results", *Path(scenario).with_suffix("").parts[-2:])
+    refuse_occupied(folder, force=force)
+    _refuse_own_inputs(folder, scenario, loaded)
+    with progress(f"simulating {scenario}", quiet=as_json) as report:
+        result = simulate(loaded, engine=engine.value, progress=report)
+    files = {"scenario.toml": loaded.to_toml().encode()}
+    if plot:
+        files |= _figures(loaded, result, quiet=as_json)
+    files |= table_files("trajectory", result.trajectory, form.value)
+    files |= table_files("metrics", result.metrics, form.value)
+    write_folder(folder, files, replaces=OUTPUTS)
+    if as_json:
+        print_json("run", result.metrics.to_pylist(), units(result.metrics), result.status)
+        return
+    print_metrics(result, loaded.system().joints)
+    say(result.message)
+    say(f"results: {folder}")
+
+
+def refuse_occupied(folder: Path, *, force: bool) -> None:
+    """Raise InputError if `folder` cannot be one, or holds something and `force` does not say that this is meant."""
+    refuse_files(folder)
+    if folder.is_dir() and not force and any(folder.iterdir()):
+        text = "is not empty: choose another folder with -o, or replace its results with --force"
+        raise InputError(Problem(str(folder), "", text))
+
+
+def refuse_files(folder: Path) -> None:
+    """Raise InputError if a file stands where `folder`, or a folder on the way to it, should be."""
+    place = next(place for place in (folder, *folder.parents) if place.exists())
+    if not place.is_dir():
+        raise InputError(Problem(str(place), "", "is a file where a folder was expected; choose another with -o"))
+
+
+def _refuse_own_inputs(folder: Path, source: str, scenario: Scenario) -> None:
+    """Raise InputError if writing the results would replace the scenario file or a table that it reads."""
+    tables = (scenario.document[name].get("path") for name in ("reference", "base_motion"))
+    inputs = {Path(name).resolve() for name in (source, *tables) if name is not None}
+    lost = sorted(str(path) for pattern in OUTPUTS for path in folder.glob(pattern) if path.resolve() in inputs)
+    if lost:
+        raise InputError(
+            Problem(
+                lost[0],
+                "",
+                "is what the run reads, and its results would take its place: choose another folder with -o",
+            )
+        )
+
+
+def print_metrics(result: Result, joints: tuple[Joint, ...]) -> None:
+    """The metrics of one run on stdout, one row a metric and one column a joint."""
+    from springline.codegen.kernel import METRICS
+    from springline.runner.storage import units
+
+    unit, values = units(result.metrics), result.metrics.to_pylist()[0]
+    rows = []
+    for metric in METRICS:
+        columns = [f"{metric}_{joint.name}" for joint in joints]
+        rows.append(
+            [
+                metric.replace("_tv", " total variation").replace("_", " "),
+                *(number(values[column], unit[column]) for column in columns),
+            ]
+        )
+    names = [joint.name for joint in joints]
+    print_table(["metric", *names], rows, right=names)
+
+
+def _figures(scenario: Scenario, result: Result, *, quiet: bool) -> dict[str, bytes]:
+    from springline.runner.plots import figure_files, run_figures
+
+    files: dict[str, bytes] = {}
+    with progress("drawing figures", quiet=quiet) as report:
+        figures = run_figures(scenario, result)
+        for done, (name, figure) in enumerate(figures.items(), 1):
+            files |= figure_files(f"figures/{name}", figure)
+            report(done / len(figures))
+    return files

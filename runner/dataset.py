@@ -1,0 +1,386 @@
+"""A dataset: sweep.json, which says what the runs are, and part-*.parquet, one for each chunk of them.
+
+A part is there if its chunk is done, so a kill at any moment loses no more than the chunks in flight. Parts come into
+being whole, and their content follows from sweep.json alone: two processes that write the same part, or a write that
+is repeated, do no harm. The lock saves double work; it is not what keeps a dataset sound.
+
+The place is a local folder or any URL that fsspec knows ("s3://bucket/name", "memory://name").
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import json
+import os
+import socket
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from pyarrow import parquet
+
+from springline.codegen.manifest import canonical_json
+from springline.runner.errors import InputError, Problem
+from springline.runner.plan import Chunk, Plan
+from springline.runner.storage import TEMPORARY, parquet_bytes, write_file
+
+DESCRIPTION = "sweep.json"
+TRAJECTORIES = "trajectories"
+
+_LOCK = ".lock"
+_PART = "part-{:06d}.parquet"
+# What may differ between the process that began a dataset and the one that resumes it.
+_FREE = ("springline", "versions")
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP)
+
+
+class Place(Protocol):
+    """Where files lie; names have slashes."""
+
+    @property
+    def name(self) -> str:
+        """The place as the user calls it."""
+        ...
+
+    def names(self, folder: str = "") -> list[str]:
+        """Names of the files in a folder, sorted; none if there is no such folder."""
+        ...
+
+    def read(self, name: str) -> bytes:
+        """Content of a file. Raises FileNotFoundError."""
+        ...
+
+    def open(self, name: str) -> Any:
+        """A file to read parts of."""
+        ...
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file whole, or leave what no reader takes for whole. Raises OSError if the place refuses."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Remove a file if it is there."""
+        ...
+
+    def locked(self) -> contextlib.AbstractContextManager[None]:
+        """Hold the place's lock. Raises InputError if another process has it."""
+        ...
+
+
+def place(destination: str | Path) -> Place:
+    """The Place of a folder's path or a URL. Raises InputError for a URL that nothing installed can handle."""
+    text = str(destination)
+    if "://" not in text or text.startswith("file://"):
+        return Folder(Path(text.removeprefix("file://")))
+    try:
+        fsspec: Any = import_module("fsspec")
+    except ImportError as error:
+        hint = "a URL needs fsspec: pip install 'springline[distributed]'"
+        raise InputError(Problem(text, "", hint)) from error
+    try:
+        files, root = fsspec.url_to_fs(text)
+    except (ValueError, ImportError) as error:
+        raise InputError(Problem(text, "", f"no place that can be written to ({error})")) from error
+    return Remote(text, files, root)
+
+
+class Folder:
+    """A local folder."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    @property
+    def name(self) -> str:
+        """The path or URL."""
+        return str(self._path)
+
+    def names(self, folder: str = "") -> list[str]:
+        """Names of the files in the folder, sorted; none if there is no such folder."""
+        try:
+            return sorted(item.name for item in os.scandir(self._path / folder) if item.is_file())
+        except FileNotFoundError:
+            return []
+        except NotADirectoryError as error:
+            raise InputError(Problem(self.name, "", "is a file: expected a folder for the dataset")) from error
+
+    def read(self, name: str) -> bytes:
+        """Content of a file."""
+        return (self._path / name).read_bytes()
+
+    def open(self, name: str) -> Any:
+        """A file to read from."""
+        return (self._path / name).open("rb")
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file, whole or not at all."""
+        target = self._path / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_file(target, content)
+
+    def remove(self, name: str) -> None:
+        """Remove a file if it is there."""
+        (self._path / name).unlink(missing_ok=True)
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Hold the folder's lock, which the system drops with the process. Raises InputError if another has it."""
+        self._path.mkdir(parents=True, exist_ok=True)
+        with (self._path / _LOCK).open("a+") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                file.seek(0)
+                raise _in_use(self.name, file.read().strip()) from error
+            except OSError as error:
+                if error.errno not in _NO_LOCKS:
+                    raise
+            file.truncate(0)
+            file.write(_owner())
+            file.flush()
+            yield
+
+
+class Remote:
+    """A folder of an fsspec file system."""
+
+    def __init__(self, url: str, files: Any, root: str) -> None:
+        self._url = url
+        self._files = files
+        self._root = root.rstrip("/")
+
+    @property
+    def name(self) -> str:
+        """The path or URL."""
+        return self._url
+
+    def _at(self, name: str) -> str:
+        return f"{self._root}/{name}" if name else self._root
+
+    def names(self, folder: str = "") -> list[str]:
+        """Names of the files in the folder, sorted; none if there is no such folder."""
+        self._files.invalidate_cache()
+        try:
+            items = self._files.ls(self._at(folder), detail=True)
+        except FileNotFoundError:
+            return []
+        return sorted(item["name"].rstrip("/").rpartition("/")[2] for item in items if item["type"] == "file")
+
+    def read(self, name: str) -> bytes:
+        """Content of a file."""
+        return bytes(self._files.cat_file(self._at(name)))
+
+    def open(self, name: str) -> Any:
+        """A file to read from."""
+        return self._files.open(self._at(name), "rb")
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file; object stores do so whole or not at all, and half a Parquet file has no footer."""
+        self._files.makedirs(self._at(name).rpartition("/")[0], exist_ok=True)
+        self._files.pipe_file(self._at(name), content)
+
+    def remove(self, name: str) -> None:
+        """Remove a file if it is there."""
+        with contextlib.suppress(FileNotFoundError):
+            self._files.rm_file(self._at(name))
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Leave a lock file while working. Raises InputError if there is one of a process that may still live."""
+        if _LOCK in self.names():
+            owner = self.read(_LOCK).decode(errors="replace").strip()
+            if not _is_gone(owner):
+                hint = f"; if that process is gone, remove {self._url.rstrip('/')}/{_LOCK}"
+                raise _in_use(self.name, owner, hint)
+        self.write(_LOCK, _owner().encode())
+        try:
+            yield
+        finally:
+            self.remove(_LOCK)
+
+
+def _owner() -> str:
+    return f"process {os.getpid()} on {socket.gethostname()}"
+
+
+def _is_gone(owner: str) -> bool:
+    """Whether a lock's owner is known to have ended: only a process of this machine can be."""
+    words = owner.split()
+    if len(words) != 4 or words[3] != socket.gethostname() or not words[1].isdecimal():
+        return False
+    try:
+        os.kill(int(words[1]), 0)
+    except ProcessLookupError:
+        return True
+    except PermissionError:
+        return False
+    return False
+
+
+def _in_use(name: str, owner: str, hint: str = "") -> InputError:
+    return InputError(Problem(name, "", f"is being written by {owner or 'another process'}{hint}"))
+
+
+class Dataset:
+    """The runs of a sweep at a Place."""
+
+    def __init__(self, where: Place) -> None:
+        self.place = where
+
+    # Beginning
+
+    def is_begun(self, *, resume: bool) -> bool:
+        """Whether the place holds a dataset. Raises InputError if it holds something that may not be continued."""
+        there = [name for name in self.place.names() if name != _LOCK and not name.startswith(TEMPORARY)]
+        if DESCRIPTION not in there and there:
+            raise InputError(Problem(self.place.name, "", "is not empty and holds no dataset", there[0]))
+        if there and not resume:
+            text = "holds a dataset already: --resume continues it, another -o begins a new one"
+            raise InputError(Problem(self.place.name, "", text))
+        return bool(there)
+
+    def begin(self, plan: Plan, versions: Mapping[str, Any], *, resume: bool) -> Plan:
+        """Make the place ready for the runs of `plan`, or of its rest, and return the plan that holds there.
+
+        A resumed dataset keeps its chunk size. Raises InputError if it holds anything that `plan` would not continue.
+        """
+        if not self.is_begun(resume=resume):
+            self.place.write(DESCRIPTION, canonical_json({**versions, **plan.as_json()}))
+            return plan
+        stored = self.description()
+        chunk = stored.get("chunk")
+        if isinstance(chunk, int) and chunk > 0 and plan.sweep.chunk in (0, chunk):
+            plan = Plan(plan.sweep, chunk)
+        new = json.loads(canonical_json(plan.as_json()))
+        old = {key: value for key, value in stored.items() if key not in _FREE}
+        changed = list(changes(old, new))
+        if changed:
+            shown = "\n  ".join(changed[:20])
+            text = f"cannot be resumed, for what it holds is not what the sweep asks for now:\n  {shown}"
+            raise InputError(Problem(self.place.name, "", text))
+        for folder in ("", TRAJECTORIES):
+            for name in self.place.names(folder):
+                if name.startswith(TEMPORARY):
+                    self.place.remove(f"{folder}/{name}" if folder else name)
+        return plan
+
+    def description(self) -> dict[str, Any]:
+        """Content of sweep.json. Raises InputError if there is none, or it is none."""
+        try:
+            content = json.loads(self.place.read(DESCRIPTION))
+        except FileNotFoundError as error:
+            raise InputError(Problem(self.place.name, "", f"holds no dataset: there is no {DESCRIPTION}")) from error
+        except ValueError as error:
+            raise InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({error})")) from error
+        if not isinstance(content, dict):
+            raise InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", "is damaged (no table)"))
+        return content
+
+    # Parts
+
+    def done(self, plan: Plan) -> set[int]:
+        """Numbers of the chunks whose part is there, whole, and of the right size."""
+        there = set(self.place.names())
+        return {k for k in range(plan.chunks) if _PART.format(k) in there and self._is_whole(plan, k)}
+
+    def _is_whole(self, plan: Plan, number: int) -> bool:
+        try:
+            with self.place.open(_PART.format(number)) as file:
+                metadata = parquet.read_metadata(file)
+        except (pa.ArrowInvalid, OSError):
+            return False  # it is written anew
+        return bool(metadata.num_rows == plan.chunk(number).runs)
+
+    def write_part(self, chunk: Chunk, table: pa.Table, trajectories: Mapping[int, pa.Table]) -> None:
+        """Store the runs of a chunk, and kept trajectories by run. Raises OSError if the place refuses."""
+        for run, trajectory in trajectories.items():
+            self.place.write(f"{TRAJECTORIES}/run-{run:09d}.parquet", parquet_bytes(trajectory))
+        self.place.write(_PART.format(chunk.number), parquet_bytes(table))
+
+    def part_name(self, number: int) -> str:
+        """File name of a chunk's part."""
+        return _PART.format(number)
+
+    def parts(self) -> list[str]:
+        """Names of the parts, in the order of the runs."""
+        return [name for name in self.place.names() if name.startswith("part-") and name.endswith(".parquet")]
+
+    def read_part(self, name: str, columns: Sequence[str] | None = None) -> pa.Table:
+        """The table of one part, or some columns of it."""
+        with self.place.open(name) as file:
+            # One thread: a column of a part is too little for more, and each would keep memory of its own.
+            return parquet.read_table(file, columns=columns, use_threads=False)
+
+    def column(self, name: str, rows: int) -> NDArray[np.float64]:
+        """One column of numbers, (rows,), NaN for null, read part by part into one array."""
+        result = np.full(rows, np.nan)
+        filled = 0
+        for part in self.parts():
+            values = self.read_part(part, [name])[name].cast(pa.float64()).to_numpy()
+            result[filled : filled + len(values)] = values
+            filled += len(values)
+        return result[:filled]
+
+
+def read_dataset(destination: str | Path, columns: Sequence[str] | None = None) -> pa.Table:
+    """All runs of a dataset, or some columns of them, as one table with units, in the order of the runs.
+
+    destination  the folder or URL that `springline batch` wrote
+    Raises InputError if it holds no dataset.
+    """
+    dataset = Dataset(place(destination))
+    dataset.description()
+    return pa.concat_tables(dataset.read_part(name, columns) for name in dataset.parts())
+
+
+def changes(old: Any, new: Any, where: str = "") -> Iterator[str]:
+    """How plain data differ, a line for each place: "sweep.vary.control.delta.uniform: [0, 1] -> [0, 2]"."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in dict.fromkeys([*old, *new]):
+            yield from changes(old.get(key, _MISSING), new.get(key, _MISSING), f"{where}.{key}" if where else key)
+    elif _is_keyed(old) and _is_keyed(new):
+        yield from changes({item["key"]: item for item in old}, {item["key"]: item for item in new}, where)
+        if (before := [item["key"] for item in old]) != (now := [item["key"] for item in new]):
+            yield f"{where}, order: {_shown(before)} -> {_shown(now)}"
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new) and any(map(_is_table, old)):
+        for i, (a, b) in enumerate(zip(old, new, strict=True)):
+            yield from changes(a, b, f"{where}.{i}")
+    elif where == "scenario" and isinstance(old, str) and isinstance(new, str):
+        yield from changes(_by_key(old), _by_key(new), where)
+    elif old != new:
+        yield f"{where}: {_shown(old)} -> {_shown(new)}"
+
+
+class _Missing:
+    """Stands for what is not there."""
+
+    def __repr__(self) -> str:
+        return "nothing"
+
+
+_MISSING = _Missing()
+
+
+def _is_table(value: object) -> bool:
+    return isinstance(value, dict)
+
+
+def _is_keyed(value: object) -> bool:
+    """Whether a value is a list of tables that name themselves."""
+    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) and "key" in item for item in value)
+
+
+def _by_key(text: str) -> dict[str, Any]:
+    return tomllib.loads(text)
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 100 else f"{text[:97]}..."

@@ -1,0 +1,107 @@
+"""`springline reproduce`: the paper's runs, tables, figures and claims, in one folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from springline.codegen.manifest import MANIFEST, Changes, FolderConflict, canonical_json, write_tree
+from springline.runner.claims import Finding, judge
+from springline.runner.paper_cases import GROUPS
+from springline.runner.paper_claims import CLAIMS
+from springline.runner.paper_figures import FIGURES, OPEN_FIGURES
+from springline.runner.paper_report import compose, plain, table_4
+from springline.runner.paper_runs import study
+from springline.runner.plots import figure_files
+from springline.runner.report import to_html, to_markdown
+from springline.runner.simulate import Progress
+
+REPORT = "report.html"
+_KIND = "reproduction"
+
+# Shares of the time that simulation and drawing take.
+_SIMULATED = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """What a reproduction came to.
+
+    folder    where everything lies: report.html, report.md, numbers.json, figures/
+    findings  the claims that these groups can test, with numbers and verdicts
+    table     Table 4 row by row: group, case, joint, measure, unit, printed, value, change (when the step is halved)
+    changes   paths that were written and removed; files that were right already are left alone
+    """
+
+    folder: Path
+    findings: tuple[Finding, ...]
+    table: tuple[dict[str, Any], ...]
+    changes: Changes
+
+    @property
+    def report(self) -> Path:
+        """The self-contained report."""
+        return self.folder / REPORT
+
+
+def reproduce(folder: Path, groups: Sequence[int] | None = None, *, progress: Progress | None = None) -> Reproduction:
+    """Repeat the paper and write report.html, report.md, numbers.json and figures/ to `folder`.
+
+    groups    groups of Table 2, None for the whole paper. Some groups alone give their rows of Table 4, their figures
+              and the claims that they can test
+    progress  called now and then with the share that is done (0 .. 1)
+    The same springline gives the same bytes. An earlier reproduction in `folder` is replaced; anything else is not.
+    Raises FolderConflict if something else is in the way (nothing is written then), ValueError for a group that
+    the paper does not have, ToolchainError if there is no C compiler.
+    """
+    _refuse_other_folders(folder)
+    whole = groups is None
+    report = progress or (lambda share: None)
+    done = study(GROUPS if groups is None else groups, whole=whole, progress=lambda share: report(_SIMULATED * share))
+    findings = judge(CLAIMS, done.evidence, done.halved)
+    files: dict[str, bytes] = {}
+    svg: dict[str, bytes] = {}
+    figures = [figure for figure in (*FIGURES, *OPEN_FIGURES) if figure.possible(done)]
+    for k, figure in enumerate(figures):
+        drawn = figure_files(figure.name, figure.make(done))
+        files |= {f"figures/{name}": content for name, content in drawn.items()}
+        svg[figure.name] = drawn[f"{figure.name}.svg"]
+        report(_SIMULATED + (1 - _SIMULATED) * (k + 1) / len(figures))
+    document = compose(done, findings, svg)
+    table = table_4(done)
+    files["report.md"] = to_markdown(document).encode()
+    files[REPORT] = to_html(document).encode()
+    files["numbers.json"] = canonical_json({"table_4": table, "claims": [_plain_finding(f) for f in findings]})
+    changes = write_tree(folder, files, {"kind": _KIND, "groups": list(done.groups), "whole": whole})
+    return Reproduction(folder, tuple(findings), tuple(table), changes)
+
+
+def _refuse_other_folders(folder: Path) -> None:
+    """A manifest of another command lists files that would be taken for ours, and removed."""
+    manifest = folder / MANIFEST
+    if not manifest.is_file():
+        return
+    try:
+        kind = json.loads(manifest.read_bytes())["kind"]
+    except (ValueError, KeyError, TypeError):
+        kind = None
+    if kind != _KIND:
+        raise FolderConflict(folder, {MANIFEST: "lists what another command wrote here"}, force_helps=False)
+
+
+def _plain_finding(finding: Finding) -> dict[str, Any]:
+    numbers = [
+        {"label": n.label, "unit": n.unit, "printed": n.printed, "value": plain(n.value), "change": plain(n.change)}
+        for n in finding.numbers
+    ]
+    return {
+        "number": finding.number,
+        "claim": finding.claim,
+        "verdict": finding.verdict,
+        "stable": finding.stable,
+        "checks": [asdict(check) for check in finding.checks],
+        "numbers": numbers,
+    }

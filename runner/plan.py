@@ -1,0 +1,449 @@
+"""From a sweep to its runs: groups that share a kernel, chunks of them, and the numbers of each run.
+
+Run i, its chunk and every number of it follow from the sweep alone. Runs are ordered so that those of a group are
+neighbours; a chunk never reaches beyond its group, for lanes of one kernel must not differ in structure or timing.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from springline.model.parameters import Bounds
+from springline.runner import sampling
+from springline.runner.errors import InputError, Problem, unknown
+from springline.runner.scenario import NumericKey, Scenario
+from springline.runner.schema import given_text, number_text
+from springline.runner.simulate import field, metrics_schema, metrics_table, trajectory_schema
+from springline.runner.sweep import Axis, Sweep
+from springline.runner.toml_text import value_text
+from springline.runner.work import Outcome, Work, work_for
+
+Floats = NDArray[np.float64]
+Columns = dict[str, NDArray[Any]]
+
+MOST_GROUPS = 256
+
+# A chunk is what a kill loses and what a thread takes at a time: some seconds of work, but no more runs than keep
+# memory flat. Whole packs for every vector width in use.
+_PACKS = 32
+_STEPS_PER_CHUNK = 4e7
+_LARGEST_CHUNK = 4096
+_FEWEST_CHUNKS = 64
+_TRAJECTORY_BYTES = 64e6
+_DEVIATIONS = 8.3  # the farthest that sampling.normal reaches
+_SCAN = 65536
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Neighbouring runs with one structure and timing.
+
+    constants    what the keys that do not vary inside the group are, by key, in the order of the sweep
+    first, runs  its runs are first .. first+runs-1;  row  of the sample that its first run takes
+    """
+
+    number: int
+    constants: dict[str, Any]
+    scenario: Scenario
+    work: Work
+    first: int
+    runs: int
+    row: int
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Runs first .. first+runs-1, all of one group: one task, one part of the dataset."""
+
+    number: int
+    group: Group
+    first: int
+    runs: int
+
+
+class Plan:
+    """All runs of a sweep.
+
+    Raises InputError, when made, for keys and values that the scenario does not admit, and for too many groups.
+    """
+
+    def __init__(self, sweep: Sweep, chunk: int = 0) -> None:
+        """`chunk`: runs per chunk, 0 for what the sweep says or what fits it."""
+        self.sweep = sweep
+        self.runs = sweep.samples * math.prod(len(axis.values) for axis in sweep.axes if axis.kind == "each")
+        self._numeric = sweep.scenario.numeric_keys()
+        self._free = [axis for axis in sweep.axes if axis.kind != "tie"]
+        self._outer = [axis for axis in self._free if self._groups_runs(axis)]
+        self._inner = [axis for axis in self._free if axis not in self._outer]
+        self._sobol: sampling.Sobol | None = None
+        self._check_axes()
+        self.groups = self._make_groups()
+        self.chunk_size = chunk or sweep.chunk or self._fitting_chunk()
+        counts = [-(-group.runs // self.chunk_size) for group in self.groups]
+        self._first_chunks = [0, *itertools.accumulate(counts)]
+
+    # Chunks
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks there are."""
+        return self._first_chunks[-1]
+
+    def chunk(self, number: int) -> Chunk:
+        """Chunk `number`, 0 .. chunks-1."""
+        index = next(i for i, first in enumerate(self._first_chunks[1:]) if number < first)
+        group = self.groups[index]
+        start = (number - self._first_chunks[index]) * self.chunk_size
+        return Chunk(number, group, group.first + start, min(self.chunk_size, group.runs - start))
+
+    def chunk_of(self, run: int) -> Chunk:
+        """The chunk that holds a run. Raises IndexError if there is no such run."""
+        if not 0 <= run < self.runs:
+            raise IndexError(run)
+        group = next(group for group in reversed(self.groups) if group.first <= run)
+        return self.chunk(self._first_chunks[group.number] + (run - group.first) // self.chunk_size)
+
+    def _fitting_chunk(self) -> int:
+        steps = max(group.work.settings.steps for group in self.groups)
+        size = min(_STEPS_PER_CHUNK / steps, _LARGEST_CHUNK, self.runs / _FEWEST_CHUNKS)
+        if self.sweep.keep:
+            system, rows = self.groups[0].work.system, max(group.work.settings.rows for group in self.groups)
+            kept = 8 * rows * len(trajectory_schema(system)) / self.sweep.keep
+            size = min(size, _TRAJECTORY_BYTES / kept)
+        return max(1, math.ceil(size / _PACKS)) * _PACKS
+
+    def kept(self, chunk: Chunk) -> list[int]:
+        """The runs of a chunk whose trajectory is stored, as indices into the chunk."""
+        every = self.sweep.keep
+        return [] if every == 0 else list(range(-chunk.first % every, chunk.runs, every))
+
+    # Numbers
+
+    def columns(self, chunk: Chunk) -> Columns:
+        """What each key of the sweep is in each run of a chunk, in the order of the sweep."""
+        row = chunk.group.row + chunk.first - chunk.group.first
+        drawn = self._drawn(row, chunk.runs)
+        return {
+            axis.key: drawn[axis.key] if axis.key in drawn else self._repeated(axis, chunk) for axis in self.sweep.axes
+        }
+
+    def _repeated(self, axis: Axis, chunk: Chunk) -> NDArray[Any]:
+        value = chunk.group.constants[axis.key]
+        if axis.key not in self._numeric:
+            value = _cell(value, self._structural_type(axis))
+        return np.full(chunk.runs, value, dtype=np.float64 if isinstance(value, float) else object)
+
+    def _structural_type(self, axis: Axis) -> pa.DataType:
+        """The type of the column of a key that is no number: what all its values have in common."""
+        source = next((other for other in self.sweep.axes if other.key == axis.tie), axis)
+        kinds = {type(value) for value in axis.values or source.values}
+        if kinds == {bool}:
+            return pa.bool_()
+        if kinds == {int}:
+            return pa.int64()
+        return pa.float64() if kinds <= {int, float} else pa.string()
+
+    def parameters(self, chunk: Chunk, columns: Columns) -> Floats:
+        """The kernel's parameters of each run of a chunk with the given columns, (runs, parameters)."""
+        numbers = {key: column for key, column in columns.items() if key in self._numeric}
+        return chunk.group.work.chosen(_values(chunk.group.scenario, numbers, chunk.runs))
+
+    def scenario_of(self, run: int) -> Scenario:
+        """The scenario of one run. Raises IndexError if there is no such run."""
+        chunk = self.chunk_of(run)
+        columns = self.columns(chunk)
+        numbers = {key: float(columns[key][run - chunk.first]) for key in columns if key in self._numeric}
+        return chunk.group.scenario.with_overrides(numbers)
+
+    def table(self, chunk: Chunk, columns: Columns, outcome: Outcome) -> pa.Table:
+        """One row a run of a chunk with the given columns: run, every key of the sweep, every metric, status, t_end."""
+        runs = np.arange(chunk.first, chunk.first + chunk.runs)
+        keys = [pa.array(columns[item.name], item.type) for item in self.key_fields]
+        metrics = metrics_table(chunk.group.work.system.joints, outcome.runs)
+        return pa.Table.from_arrays([pa.array(runs), *keys, *metrics.columns], schema=self.schema)
+
+    @cached_property
+    def schema(self) -> pa.Schema:
+        """Columns of the dataset's table."""
+        metrics = metrics_schema(self.groups[0].work.system.joints)
+        return pa.schema([field("run", "", pa.int64()), *self.key_fields, *metrics])
+
+    @cached_property
+    def key_fields(self) -> list[pa.Field]:
+        """The columns of the sweep's keys, with their units."""
+        return [
+            field(axis.key, self._numeric[axis.key].unit)
+            if axis.key in self._numeric
+            else field(axis.key, "", self._structural_type(axis))
+            for axis in self.sweep.axes
+        ]
+
+    def numeric_axes(self) -> list[Axis]:
+        """The axes along which numbers vary by themselves inside a group, in the order of the sweep."""
+        return [axis for axis in self._inner if len(axis.values) != 1]
+
+    # Description
+
+    def as_json(self) -> dict[str, Any]:
+        """All that decides the dataset, as plain data: two plans with the same description give the same tables."""
+        return {
+            "sweep": self.sweep.as_json(),
+            "scenario": self.sweep.scenario.to_toml(),
+            "tables": tables_hash(self.sweep.scenario),
+            "groups": [
+                {
+                    "constants": group.constants,
+                    "first": group.first,
+                    "runs": group.runs,
+                    "kernel": group.work.identity,
+                }
+                for group in self.groups
+            ],
+            "runs": self.runs,
+            "chunk": self.chunk_size,
+            "chunks": self.chunks,
+        }
+
+    # Making groups
+
+    def _groups_runs(self, axis: Axis) -> bool:
+        moved = [axis, *(other for other in self.sweep.axes if other.tie == axis.key)]
+        return axis.kind == "each" or any(item.key not in self._numeric for item in moved)
+
+    def _make_groups(self) -> list[Group]:
+        grid = self.sweep.method == "grid"
+        crossed = [axis for axis in self._outer if grid or axis.kind == "each"]
+        shared = [axis for axis in self._outer if axis not in crossed]
+        combinations = math.prod(len(axis.values) for axis in self._outer)
+        if combinations > MOST_GROUPS:
+            keys = ", ".join(axis.key for axis in self._outer)
+            raise InputError(
+                Problem(
+                    self.sweep.source,
+                    "vary",
+                    f"expected at most {MOST_GROUPS} groups of structural, timing and 'each' keys ({keys})",
+                    str(combinations),
+                )
+            )
+        shares = list(itertools.product(*(range(len(axis.values)) for axis in shared)))
+        rows = self.runs // math.prod(len(axis.values) for axis in crossed)
+        edges = [rows * i // len(shares) for i in range(len(shares) + 1)]
+        groups: list[Group] = []
+        works: dict[str, tuple[Scenario, Work]] = {}
+        first = 0
+        for fixed in itertools.product(*(range(len(axis.values)) for axis in crossed)):
+            for share, low, high in zip(shares, edges[:-1], edges[1:], strict=True):
+                if low == high:
+                    continue
+                chosen = {axis.key: i for axis, i in zip([*crossed, *shared], [*fixed, *share], strict=True)}
+                constants = self._constants(chosen)
+                structural = {key: value for key, value in constants.items() if key not in self._numeric}
+                name = repr(structural)
+                if name not in works:
+                    scenario = self._structured(structural)
+                    works[name] = scenario, self._work(scenario)
+                groups.append(Group(len(groups), constants, *works[name], first, high - low, low))
+                first += high - low
+        return groups
+
+    def _constants(self, chosen: Mapping[str, int]) -> dict[str, Any]:
+        """The outer keys and what is tied to them."""
+        constants = {}
+        for axis in self.sweep.axes:
+            if axis.key in chosen:
+                constants[axis.key] = axis.values[chosen[axis.key]]
+            elif axis.tie in chosen:
+                place = chosen[axis.tie]
+                other = next(item for item in self._outer if item.key == axis.tie)
+                constants[axis.key] = axis.values[place] if axis.values else axis.factor * other.values[place]
+        return {key: float(value) if key in self._numeric else value for key, value in constants.items()}
+
+    def _structured(self, structural: Mapping[str, Any]) -> Scenario:
+        if not structural:
+            return self.sweep.scenario
+        try:
+            return self.sweep.scenario.with_overrides(structural)
+        except InputError as error:
+            moved = (replace(problem, where=self.sweep.source, key=f"vary.{problem.key}") for problem in error.problems)
+            raise InputError(*moved) from error
+
+    def _work(self, scenario: Scenario) -> Work:
+        """The Work of a group: which slots its keys move is seen by moving them, one axis at a time."""
+        valid = scenario.numeric_keys()
+        missing = [axis.key for axis in self.sweep.axes if axis.key in self._numeric and axis.key not in valid]
+        if missing:
+            kind, source = "numeric key of a group", self.sweep.source
+            raise InputError(*(unknown(source, f"vary.{key}", kind, key, valid) for key in missing))
+        probes: list[dict[str, float]] = []
+        start = {axis.key: self._extremes(axis)[0] for axis in self._free}
+        for axis in self._free:
+            probes += [self._probe(start | {axis.key: extreme}) for extreme in self._extremes(axis)]
+        columns = {key: np.array([probe[key] for probe in probes]) for key in probes[0]} if probes else {}
+        values = _values(scenario, columns, max(len(probes), 1))
+        slots = scenario.system().slots
+        tunable = [slots[i].key for i in np.flatnonzero((values != values[0]).any(axis=0))]
+        return work_for(scenario, tunable, values[0])
+
+    def _extremes(self, axis: Axis) -> list[tuple[float, int]]:
+        """Values that an axis takes, with their place in `values`: the ends, or all there are."""
+        if axis.values:
+            return [(value, place) for place, value in enumerate(axis.values)]
+        low, high = axis.span
+        return [(low, 0), (high if axis.kind != "normal" else low + high, 1)]
+
+    def _probe(self, at: Mapping[str, tuple[Any, int]]) -> dict[str, float]:
+        """The numeric keys of a run whose free axes stand at the given values."""
+        probe = {}
+        for axis in self.sweep.axes:
+            value, place = at[axis.tie or axis.key]
+            if axis.kind == "tie":
+                value = axis.values[place] if axis.values else axis.factor * value
+            if axis.key in self._numeric:
+                probe[axis.key] = float(value)
+        return probe
+
+    # Drawing
+
+    def _drawn(self, row: int, count: int) -> Columns:
+        """The inner keys of sample rows row .. row+count-1, and what is tied to them."""
+        places: dict[str, NDArray[np.int64]] = {}
+        drawn: Columns = {}
+        if self.sweep.method == "grid":
+            index = np.arange(row, row + count)
+            for axis in reversed(self._inner):
+                index, places[axis.key] = np.divmod(index, axis.points or len(axis.values))
+            for axis in self._inner:
+                drawn[axis.key] = _grid_values(axis)[places[axis.key]]
+        else:
+            for axis, u in zip(self._inner, self._unit_columns(row, count), strict=True):
+                if axis.values:
+                    places[axis.key] = sampling.chosen(u, len(axis.values))
+                    drawn[axis.key] = np.array(axis.values, dtype=np.float64)[places[axis.key]]
+                else:
+                    drawn[axis.key] = _spread(axis, u)
+        for axis in self.sweep.axes:
+            if axis.tie in drawn:
+                own = np.array(axis.values, dtype=np.float64)
+                drawn[axis.key] = own[places[axis.tie]] if axis.values else axis.factor * drawn[axis.tie]
+        return drawn
+
+    def _unit_columns(self, row: int, count: int) -> Iterator[Floats]:
+        """Numbers in (0, 1) for each inner axis."""
+        seed, names = self.sweep.seed, tuple(axis.key for axis in self._inner)
+        if self.sweep.method == "sobol" and names:
+            self._sobol = self._sobol or sampling.Sobol(seed, names)
+            yield from self._sobol.rows(row, count).T
+        elif self.sweep.method == "latin_hypercube":
+            yield from (sampling.latin_hypercube(seed, name, row, count, self.sweep.samples) for name in names)
+        else:
+            yield from (sampling.random(seed, name, row, count) for name in names)
+
+    # Checking
+
+    def _check_axes(self) -> None:
+        """Raises InputError for axes that do not suit their keys."""
+        by_key = {axis.key: axis for axis in self.sweep.axes}
+        problems: list[Problem] = []
+        for axis in self.sweep.axes:
+            source = by_key.get(axis.tie, axis)
+            if axis.key in self._numeric:
+                problems += self._number_problems(axis, source, self._numeric[axis.key])
+            else:
+                problems += self._structural_problems(axis, source)
+        if problems:
+            raise InputError(*problems)
+
+    def _number_problems(self, axis: Axis, source: Axis, key: NumericKey) -> list[Problem]:
+        label = f"vary.{axis.key}"
+        expected = f"expected {number_text(key.bounds, key.unit)}"
+        values = axis.values or (source.values if axis.kind == "tie" else ())
+        if any(isinstance(value, bool) or not isinstance(value, int | float) for value in values):
+            return [Problem(self.sweep.source, label, expected, given_text(list(values)))]
+        reach = values or source.span
+        if source.kind == "normal" and not values:
+            mean, deviation = source.span
+            reach = (mean - _DEVIATIONS * deviation, mean + _DEVIATIONS * deviation)
+        factor = 1.0 if axis.values else axis.factor
+        bad = [factor * value for value in reach if not key.bounds.holds(factor * value)]
+        if key.bounds.even and not values:
+            return [Problem(self.sweep.source, label, f"{expected}: use {{ values = [...] }}")]
+        if not bad:
+            return []
+        if source.kind != "normal" or values:
+            return [Problem(self.sweep.source, label, expected, given_text(float(bad[0])))]
+        return self._normal_problems(axis, source, key.bounds, expected)
+
+    def _normal_problems(self, axis: Axis, source: Axis, bounds: Bounds, expected: str) -> list[Problem]:
+        """A normal axis can reach beyond the bounds: whether it does, only its numbers tell."""
+        for row in range(0, self.sweep.samples, _SCAN):
+            count = min(_SCAN, self.sweep.samples - row)
+            units = dict(zip((item.key for item in self._inner), self._unit_columns(row, count), strict=True))
+            numbers = axis.factor * _spread(source, units[source.key])
+            bad = [int(i) for i in (numbers.argmin(), numbers.argmax()) if not bounds.holds(float(numbers[i]))]
+            if bad:
+                text = f"{expected}, but row {row + bad[0]} of the sample is not (a smaller deviation, or uniform?)"
+                return [Problem(self.sweep.source, f"vary.{axis.key}", text, given_text(float(numbers[bad[0]])))]
+        return []
+
+    def _structural_problems(self, axis: Axis, source: Axis) -> list[Problem]:
+        label = f"vary.{axis.key}"
+        if axis.kind == "tie" and not axis.values and not (source.values and axis.factor == 1.0):
+            text = "no number that runs of one kernel may differ in: expected values = [...] beside the tie"
+            return [Problem(self.sweep.source, label, text)]
+        if axis.kind != "tie" and not axis.values:
+            known = {**self._numeric, **dict.fromkeys(_document_keys(self.sweep.scenario))}
+            if axis.key not in known:
+                return [unknown(self.sweep.source, label, "key", axis.key, known)]
+            text = "no number that runs of one kernel may differ in: expected { values = [...] } or { each = [...] }"
+            return [Problem(self.sweep.source, label, text, given_text(axis.as_toml()))]
+        return []
+
+
+def _values(scenario: Scenario, columns: Mapping[str, NDArray[Any]], runs: int) -> Floats:
+    """Scenario.values_for, which also answers for no columns at all."""
+    return scenario.values_for(columns) if columns else np.tile(scenario.values(), (runs, 1))
+
+
+def _grid_values(axis: Axis) -> Floats:
+    if axis.values:
+        return np.array(axis.values, dtype=np.float64)
+    values = _spread(axis, np.linspace(0.0, 1.0, axis.points))
+    values[0], values[-1] = axis.span
+    return values
+
+
+def _spread(axis: Axis, u: Floats) -> Floats:
+    draw = {"uniform": sampling.uniform, "log_uniform": sampling.log_uniform, "normal": sampling.normal}[axis.kind]
+    return draw(u, *axis.span)
+
+
+def _cell(value: Any, kind: pa.DataType) -> Any:
+    """A value as a cell of a column of this type: in a column of texts, lists and tables stand as TOML."""
+    if not pa.types.is_string(kind):
+        return float(value) if pa.types.is_floating(kind) else value
+    return value if isinstance(value, str) else value_text(value)
+
+
+def tables_hash(scenario: Scenario) -> str:
+    """Hash of the signal tables, whose numbers stand in files of their own; "" if there are none."""
+    if not scenario.signal_tables:
+        return ""
+    digest = sha256()
+    for table in scenario.signal_tables:
+        digest.update(repr((table.t0, table.dt, table.ends, table.coefficients.shape)).encode())
+        digest.update(np.ascontiguousarray(table.coefficients, "<f8").tobytes())
+    return digest.hexdigest()
+
+
+def _document_keys(scenario: Scenario) -> list[str]:
+    return [f"{table}.{key}" for table, entries in scenario.document.items() for key in entries]

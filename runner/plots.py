@@ -1,0 +1,345 @@
+"""One house style for every figure, and the figures of a single run.
+
+Figures fit a paper's column (86 mm), and their lines can be told apart without colours: each has a colour of Okabe and
+Ito's palette and a dash pattern of its own. Legends stand above the axes, where there is no data. Labels are plain
+Unicode, for mathtext takes three times as long. The same numbers give the same bytes: fonts come with Matplotlib, SVG
+identifiers from a fixed salt, and nothing records a date.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pyarrow as pa
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from springline.model.base import COORDINATES, BaseCoordinate
+from springline.model.parameters import Joint
+from springline.runner.scenario import Scenario
+from springline.runner.simulate import Result
+from springline.runner.storage import units
+
+Floats = NDArray[np.float64]
+Line = Mapping[str, Any]
+"""Keyword arguments of Axes.plot."""
+
+COLUMN = 3.39
+"""Width of a paper's column, inches (86 mm)."""
+PAGE = 7.0
+"""Width of a figure across both columns, inches."""
+
+LINES: tuple[Line, ...] = (
+    {"color": "#0072B2", "linestyle": "-"},
+    {"color": "#D55E00", "linestyle": (0, (5, 1.5))},
+    {"color": "#009E73", "linestyle": (0, (5, 1.5, 1, 1.5))},
+    {"color": "#CC79A7", "linestyle": (0, (1, 1.2))},
+    {"color": "#E69F00", "linestyle": (0, (8, 2))},
+    {"color": "#56B4E9", "linestyle": (0, (3, 1, 1, 1, 1, 1))},
+)
+"""The k-th line of a figure: blue, vermillion, green, purple, orange, sky blue."""
+
+REFERENCE: Line = {"color": "black", "linestyle": (0, (4, 2)), "linewidth": 0.8}
+"""A desired trajectory."""
+
+STYLE: Mapping[Any, Any] = {
+    "axes.axisbelow": True,
+    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.useoffset": False,
+    "axes.grid": True,
+    "axes.labelsize": 8,
+    "axes.linewidth": 0.6,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 8,
+    "axes.xmargin": 0.0,
+    "figure.constrained_layout.use": True,
+    "font.family": "DejaVu Sans",  # the font that comes with Matplotlib
+    "font.size": 8,
+    "grid.alpha": 0.3,
+    "grid.linewidth": 0.5,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+    "lines.linewidth": 1.1,
+    "savefig.dpi": 250,
+    "svg.fonttype": "path",  # looks the same wherever it is opened
+    "svg.hashsalt": "springline",
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+}
+
+_BUCKETS = 1500
+_POINTS = 2000  # of a scatter plot
+_MOVES = 1e-12  # a base coordinate that stays below this stands still
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Context in which figures are made and drawn in the house style, whatever the user's matplotlibrc says."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        yield
+
+
+def panels(
+    rows: int = 1, columns: int = 1, *, width: float = COLUMN, height: float = 1.5, share_x: bool = True
+) -> tuple[Figure, NDArray[Any]]:
+    """A figure and its (rows, columns) array of Axes; width of the figure and height of a row in inches."""
+    figure = Figure(figsize=(width, height * rows + 0.5))
+    return figure, figure.subplots(rows, columns, sharex=share_x, squeeze=False)
+
+
+def label(quantity: str, unit: str) -> str:
+    """Axis label "quantity [unit]", powers raised; "1" and "" are no unit."""
+    shown = unit.replace("^2", "²").replace("^3", "³").replace(" ", " · ")
+    return quantity if unit in {"", "1"} else f"{quantity} [{shown}]"
+
+
+def draw(axes: Axes, t: Floats, y: Floats, name: str = "", **style: Any) -> None:
+    """Plot y over t; of a long record the extremes of each of 1500 intervals, which look the same and keep files small.
+
+    t, y  (rows,), one unit each;  name  legend entry;  style  keyword arguments of Axes.plot
+    """
+    axes.plot(*envelope(t, y), label=name or "_", **style)
+
+
+def envelope(t: Floats, y: Floats, buckets: int = _BUCKETS) -> tuple[Floats, Floats]:
+    """The rows at which y is least and greatest in each of `buckets` equal parts, in the order of time; ends kept."""
+    if len(y) <= 4 * buckets:
+        return t, y
+    edges = np.linspace(0, len(y), buckets + 1).astype(int)
+    picked = {0, len(y) - 1}
+    for first, last in itertools.pairwise(edges):
+        part = y[first:last]
+        picked |= {first + int(np.argmin(part)), first + int(np.argmax(part))}
+    rows = np.array(sorted(picked))
+    return t[rows], y[rows]
+
+
+def legend_above(figure: Figure, columns: int = 2) -> None:
+    """One legend for the whole figure, above all axes; lines of the same name are listed once."""
+    entries: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, name in zip(*axes.get_legend_handles_labels(), strict=True):
+            entries.setdefault(name, handle)
+    if entries:
+        figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=min(columns, len(entries)))
+
+
+def figure_files(name: str, figure: Figure) -> dict[str, bytes]:
+    """The figure as ``name.png`` and ``name.svg``, by file name; the same figure gives the same bytes.
+
+    Its layout is final after that.
+    """
+    with house_style():
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # or every file is laid out anew
+        return {
+            f"{name}.png": _saved(figure, "png", {"Software": None}),
+            f"{name}.svg": _saved(figure, "svg", {"Date": None, "Creator": None}),
+        }
+
+
+def _saved(figure: Figure, form: str, metadata: Mapping[str, str | None]) -> bytes:
+    sink = io.BytesIO()
+    figure.savefig(sink, format=form, metadata=metadata)
+    return sink.getvalue()
+
+
+# --- the figures of a run --------------------------------------------------------------------------------
+
+
+def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
+    """The overview of one run, by name: tracking, error, force, sliding, springs; base_motion if the base moves. If the
+    run came to its end also steady_state, and error_over_base and error_against_base if the base follows a record.
+    """
+    run = _Run(scenario, result)
+    figures: dict[str, Callable[[_Run], Figure]] = {
+        "tracking": _tracking,
+        "error": _error,
+        "force": _lines("force U", "U"),
+        "sliding": _lines("sliding σ", "sigma"),
+        "springs": _lines("spring q₂ − q₁", "q2", less="q1"),
+    }
+    if run.moving:
+        figures["base_motion"] = _base_motion
+    if run.status == "ok":
+        figures["steady_state"] = _steady_state
+        if run.moving and scenario.structure().base_motion.kind == "table":
+            figures |= {"error_over_base": _error_over_base, "error_against_base": _error_against_base}
+    with house_style():
+        return {name: make(run) for name, make in figures.items()}
+
+
+class _Run:
+    """A run as the figures want it: columns as arrays, with their units."""
+
+    def __init__(self, scenario: Scenario, result: Result) -> None:
+        self.joints: tuple[Joint, ...] = scenario.system().joints
+        self.bands = (scenario.response_band, scenario.settling_band)
+        self.status, self.message = result.status, result.message
+        self._table: pa.Table = result.trajectory
+        self._metrics: dict[str, Any] = result.metrics.to_pylist()[0]
+        self._units = units(result.trajectory)
+        self.t = self["t"]
+        self.moving: tuple[BaseCoordinate, ...] = tuple(
+            c for c in COORDINATES if np.max(np.abs(self[c.symbol])) > _MOVES
+        )
+
+    def __getitem__(self, column: str) -> Floats:
+        values: Floats = self._table[column].to_numpy()
+        return values
+
+    @property
+    def settled(self) -> NDArray[np.bool_]:
+        """The rows after three settling times, when nothing is left of the start, but at the least the last quarter;
+        the last three quarters where a run does not settle.
+        """
+        times = [self.metric("settling_time", joint) for joint in self.joints]
+        known = [time for time in times if time is not None]
+        quarter = (self.t[-1] - self.t[0]) / 4
+        start = min(3.0 * max(known), self.t[-1] - quarter) if known else self.t[0] + quarter
+        late: NDArray[np.bool_] = self.t >= start
+        return late
+
+    def metric(self, name: str, joint: Joint) -> float | None:
+        value: float | None = self._metrics[f"{name}_{joint.name}"]
+        return value
+
+    def unit(self, column: str) -> str:
+        return self._units[column]
+
+
+def _joint_panels(run: _Run, quantity: str, column: str) -> tuple[Figure, list[tuple[Axes, Joint]]]:
+    """One panel a joint over time, labelled with the unit of `column`."""
+    figure, grid = panels(len(run.joints))
+    pairs = list(zip(grid[:, 0], run.joints, strict=True))
+    for axes, joint in pairs:
+        axes.set_ylabel(label(f"{joint.name}\n{quantity}", run.unit(f"{column}_{joint.name}")))
+    _time_axis(run, figure)
+    return figure, pairs
+
+
+def _time_axis(run: _Run, figure: Figure) -> None:
+    figure.axes[-1].set_xlabel(label("time", "s"))
+    if run.status != "ok":
+        stopped = f"{run.status.replace('_', ' ')} at {run.t[-1]:g} s"
+        for axes in figure.axes:
+            axes.axvline(run.t[-1], color="#D55E00", linestyle=":", label=stopped)
+
+
+def _tracking(run: _Run) -> Figure:
+    figure, pairs = _joint_panels(run, "coordinate", "q1")
+    for axes, joint in pairs:
+        draw(axes, run.t, run[f"q1_{joint.name}"], "link q₁", **LINES[0])
+        draw(axes, run.t, run[f"q1d_{joint.name}"], "reference", **REFERENCE)
+    legend_above(figure)
+    return figure
+
+
+def _error(run: _Run) -> Figure:
+    """The error with the bands that define response and settling time, and these times."""
+    figure, pairs = _joint_panels(run, "error e", "e")
+    response, settling = run.bands
+    for axes, joint in pairs:
+        e = run[f"e_{joint.name}"]
+        start = abs(float(e[0]))
+        for band, shade in ((response, "0.90"), (settling, "0.78")) if start else ():
+            axes.axhspan(-band * start, band * start, color=shade, linewidth=0, label=f"±{100 * band:g} % of |e(0)|")
+        draw(axes, run.t, e, "error", **LINES[0])
+        for metric, name, mark in (("response_time", "response time", "o"), ("settling_time", "settling time", "s")):
+            at = run.metric(metric, joint)
+            if at is not None:
+                axes.plot(
+                    at,
+                    np.interp(at, run.t, e),
+                    mark,
+                    markersize=3.5,
+                    color="#D55E00",
+                    label=name,
+                    markerfacecolor="white" if mark == "o" else None,
+                    zorder=3,
+                )
+    legend_above(figure)
+    return figure
+
+
+def _steady_state(run: _Run) -> Figure:
+    """The error in the last quarter of the run, where a scale of its own shows it."""
+    figure, pairs = _joint_panels(run, "error e", "e")
+    late = run.t >= run.t[0] + 0.75 * (run.t[-1] - run.t[0])
+    for axes, joint in pairs:
+        draw(axes, run.t[late], run[f"e_{joint.name}"][late], "error", **LINES[0])
+        worst = run.metric("steady_state_error", joint)
+        for limit in () if worst is None else (-worst, worst):
+            axes.axhline(limit, label="± steady-state error", **REFERENCE)
+    legend_above(figure)
+    return figure
+
+
+def _lines(quantity: str, column: str, less: str = "") -> Callable[[_Run], Figure]:
+    """A figure of one column per joint, or of the difference `column` - `less`."""
+
+    def make(run: _Run) -> Figure:
+        figure, pairs = _joint_panels(run, quantity, column)
+        for axes, joint in pairs:
+            y = run[f"{column}_{joint.name}"]
+            draw(axes, run.t, y - run[f"{less}_{joint.name}"] if less else y, **LINES[0])
+        legend_above(figure)
+        return figure
+
+    return make
+
+
+def _base_motion(run: _Run) -> Figure:
+    figure, grid = panels(len(run.moving), height=1.1)
+    for axes, coordinate in zip(grid[:, 0], run.moving, strict=True):
+        draw(axes, run.t, run[coordinate.symbol], **LINES[0])
+        axes.set_ylabel(label(coordinate.key, coordinate.unit))
+    _time_axis(run, figure)
+    legend_above(figure)
+    return figure
+
+
+def _error_over_base(run: _Run) -> Figure:
+    """Tracking error below the base motion that disturbs it, on one time axis, once the start is over."""
+    rows = [(label(c.key, c.unit), c.symbol, LINES[0]) for c in run.moving]
+    rows += [
+        (label(f"{j.name}\nerror", run.unit(f"e_{j.name}")), f"e_{j.name}", {**LINES[1], "linestyle": "-"})
+        for j in run.joints
+    ]
+    figure, grid = panels(len(rows), height=0.85)
+    late = run.settled
+    for axes, (text, column, line) in zip(grid[:, 0], rows, strict=True):
+        draw(axes, run.t[late], run[column][late], **line)
+        axes.set_ylabel(text)
+    _time_axis(run, figure)
+    figure.align_ylabels()
+    legend_above(figure)
+    return figure
+
+
+def _error_against_base(run: _Run) -> Figure:
+    """Each joint's error against each moving coordinate of the base, once the start is over, with their correlation."""
+    figure, grid = panels(len(run.joints), len(run.moving), width=PAGE, height=1.7, share_x=False)
+    late = np.flatnonzero(run.settled)
+    late = late[:: max(1, len(late) // _POINTS)]
+    for row, joint in zip(grid, run.joints, strict=True):
+        e = run[f"e_{joint.name}"][late]
+        for axes, coordinate in zip(row, run.moving, strict=True):
+            b = run[coordinate.symbol][late]
+            axes.plot(b, e, ".", markersize=2, color=LINES[0]["color"], alpha=0.4, markeredgewidth=0, rasterized=True)
+            axes.set_title(f"correlation {np.corrcoef(b, e)[0, 1]:+.2f}".replace("-", "−"), loc="right", fontsize=7)
+            axes.set_xlabel(label(coordinate.key, coordinate.unit))
+            axes.margins(x=0.03)
+        row[0].set_ylabel(label(f"{joint.name} error", run.unit(f"e_{joint.name}")))
+    return figure

@@ -1,0 +1,219 @@
+"""What a dataset says: shares of what became of the runs, quantiles of each metric, the worst runs, and figures.
+
+Tables of a million rows are read one column, or one part, at a time, so that memory stays flat.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from springline.codegen.kernel import METRICS, STATUS
+from springline.runner import sampling
+from springline.runner.dataset import Dataset
+from springline.runner.plan import Plan
+from springline.runner.storage import units
+from springline.runner.toml_text import value_text
+
+Floats = NDArray[np.float64]
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+WORST = 10
+
+_OUTCOMES = STATUS[:3]
+_SHOWN = 20_000  # rows that figures are drawn from
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """A metric over the runs that have it: its QUANTILES, and the share of all runs that do not."""
+
+    quantiles: tuple[float, ...]
+    missing: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What the runs of a dataset have in common, and which are the worst.
+
+    outcomes  per group of the sweep ("all" if there is one only), the number of runs by status
+    metrics   by column
+    worst     rows of the dataset: runs that stopped, the earliest first, then those with the largest steady-state error
+    shown     rows for figures: all, or a random subset of a large dataset
+    """
+
+    runs: int
+    outcomes: dict[str, dict[str, int]]
+    metrics: dict[str, Distribution]
+    units: dict[str, str]
+    worst: list[dict[str, Any]]
+    shown: pa.Table
+
+    @property
+    def stopped(self) -> int:
+        """Runs that diverged or left their bounds."""
+        return sum(count for group in self.outcomes.values() for status, count in group.items() if status != "ok")
+
+
+def summarize(plan: Plan, dataset: Dataset) -> Summary:
+    """The Summary of the parts that are there. Raises ValueError if there are none."""
+    parts = dataset.parts()
+    if not parts:
+        raise ValueError("no runs to summarize")
+    columns = [f"{metric}_{joint.name}" for metric in METRICS for joint in plan.groups[0].work.system.joints]
+    metrics, runs = {}, 0
+    for column in columns:
+        values = dataset.column(column, plan.runs)
+        runs = len(values)
+        metrics[column] = _distribution(values)
+    errors = {column: metrics[column] for column in columns if column.startswith("steady_state_error_")}
+    scales = {column: item.quantiles[QUANTILES.index(0.5)] or 1.0 for column, item in errors.items()}
+
+    names = group_names(plan)
+    outcomes = {name: dict.fromkeys(_OUTCOMES, 0) for name in names}
+    edges = np.array([group.first for group in plan.groups])
+    worst: list[tuple[float, int, dict[str, Any]]] = []
+    shown = []
+    for part in parts:
+        table = dataset.read_part(part)
+        run = table["run"].to_numpy()
+        status = np.array(table["status"].to_pylist())
+        groups = np.searchsorted(edges, run, side="right") - 1
+        for group in np.unique(groups):
+            for outcome in _OUTCOMES:
+                outcomes[names[group]][outcome] += int(np.count_nonzero(status[groups == group] == outcome))
+        worst = heapq.nlargest(WORST, chain(worst, _scored(table, status, scales)), key=lambda item: item[:2])
+        picked = _picked(run, runs)
+        if picked.any():
+            shown.append(table.filter(pa.array(picked)))
+    table = pa.concat_tables(shown).combine_chunks() if shown else plan.schema.empty_table()
+    return Summary(runs, outcomes, metrics, units(table), [row for _, _, row in worst], table)
+
+
+def _distribution(values: Floats) -> Distribution:
+    """Quantiles by the nearest rank; sorts in place, for a copy of a long column would be felt."""
+    count = int(np.count_nonzero(~np.isnan(values)))
+    if count == 0:
+        return Distribution((float("nan"),) * len(QUANTILES), 1.0)
+    values.sort()  # NaN last
+    places = [round(q * (count - 1)) for q in QUANTILES]
+    return Distribution(tuple(float(values[place]) for place in places), 1.0 - count / len(values))
+
+
+def _scored(
+    table: pa.Table, status: NDArray[Any], scales: Mapping[str, float]
+) -> Iterator[tuple[float, int, dict[str, Any]]]:
+    """The worst rows of a part: (badness, -run, row). A run that stopped is worse than any that did not."""
+    error = np.zeros(len(status))
+    for column, scale in scales.items():
+        values = table[column].to_numpy()
+        error = np.fmax(error, values / scale)
+    end = table["t_end"].to_numpy()
+    badness = np.where(status == "ok", np.arctan(error), 10.0 + 1.0 / (1.0 + end))
+    for row in np.argsort(-badness, kind="stable")[:WORST]:
+        content = table.slice(int(row), 1).to_pylist()[0]
+        yield float(badness[row]), -int(content["run"]), content
+
+
+def _picked(run: NDArray[np.int64], runs: int) -> NDArray[np.bool_]:
+    """Which runs figures show: all, or a random choice that does not depend on how they are cut into parts."""
+    if runs <= _SHOWN:
+        return np.ones(len(run), dtype=np.bool_)
+    first = int(run[0])
+    return np.asarray(sampling.random(0, "figures", first, int(run[-1]) - first + 1)[run - first] < _SHOWN / runs)
+
+
+def group_names(plan: Plan) -> list[str]:
+    """What tells the groups of a sweep apart: "control.fast = false", "all" if there is one only."""
+    if len(plan.groups) == 1:
+        return ["all"]
+    tied = {axis.key for axis in plan.sweep.axes if axis.kind == "tie"}
+    constants = ({key: value for key, value in group.constants.items() if key not in tied} for group in plan.groups)
+    return [", ".join(f"{key.rpartition('.')[2]} = {_short(value)}" for key, value in c.items()) for c in constants]
+
+
+def _short(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:g}"
+    text = str(value)
+    return text if len(text) <= 30 else f"{text[:29]}…"
+
+
+# --- tables ----------------------------------------------------------------------------------------------
+
+Rows = tuple[list[str], list[list[str]]]
+"""Header and rows of a table of texts."""
+
+
+def outcome_rows(summary: Summary) -> Rows:
+    """How many runs of each group ended how."""
+    header = ["group", "runs", "ok", "diverged", "out of bounds", "stopped early"]
+    rows = []
+    for name, counts in summary.outcomes.items():
+        total = sum(counts.values())
+        share = (total - counts["ok"]) / total if total else 0.0
+        rows.append([name, str(total), *(str(counts[outcome]) for outcome in _OUTCOMES), f"{share:.2%}"])
+    return header, rows
+
+
+def metric_rows(summary: Summary) -> Rows:
+    """Quantiles of every metric, over the runs that have it."""
+    names = {0.0: "least", 0.5: "median", 1.0: "largest"}
+    header = ["metric", "unit", *(names.get(q, f"{q:.0%}") for q in QUANTILES), "none"]
+    rows = [
+        [
+            column,
+            summary.units[column],
+            *("–" if np.isnan(value) else f"{value:.4g}" for value in item.quantiles),
+            f"{item.missing:.2%}",
+        ]
+        for column, item in summary.metrics.items()
+    ]
+    return header, rows
+
+
+def worst_rows(summary: Summary, keys: Sequence[str]) -> Rows:
+    """The worst runs with what varied and what came of it."""
+    results = [name for name in summary.units if name.startswith(("settling_time_", "steady_state_error_"))]
+    header = ["run", "status", "t_end", *keys, *results]
+    return header, [[_cell(row[name]) for name in header] for row in summary.worst]
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.6g}" if isinstance(value, float) else _short(value)
+
+
+def markdown(plan: Plan, summary: Summary, figures: Sequence[str], name: str) -> str:
+    """summary.md: the tables, and the figures by file name."""
+    keys = [axis.key for axis in plan.sweep.axes]
+    varied = "\n".join(f"- `{axis.key}`: `{value_text(axis.as_toml())}`" for axis in plan.sweep.axes)
+    sections = [
+        f"# {name}",
+        f"{summary.runs:,} of {plan.runs:,} runs of `{plan.sweep.scenario.source}` ({plan.sweep.method}, "
+        f"seed {plan.sweep.seed}).\n\n{varied}",
+        "## What became of the runs\n\n" + _markdown_table(outcome_rows(summary)),
+        *(f"![{figure.rpartition('.')[0]}]({figure})" for figure in figures),
+        "## Metrics\n\nQuantiles over the runs that have the metric; the last column is the share that has not.\n\n"
+        + _markdown_table(metric_rows(summary)),
+        "## The worst runs\n\nThose that stopped, the earliest first; then those with the largest steady-state error. "
+        "`springline replay` simulates one of them again with its trajectory.\n\n"
+        + _markdown_table(worst_rows(summary, keys)),
+    ]
+    return "\n\n".join(sections) + "\n"
+
+
+def _markdown_table(table: Rows) -> str:
+    header, rows = table
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

@@ -1,0 +1,178 @@
+"""What one kernel does for many runs: the same Work runs in a thread here or in a worker process elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from hashlib import sha256
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springline.codegen import lanes
+from springline.codegen.kernel import (
+    Control,
+    Kernel,
+    LoopSettings,
+    Runs,
+    Table,
+    kernel,
+)
+from springline.codegen.kernel_source import KernelOptions, KernelSource, print_kernel, runtime_sources
+from springline.codegen.manifest import canonical_json
+from springline.codegen.program import program
+from springline.model.system import Structure, System
+from springline.runner.scenario import Scenario
+from springline.runner.simulate import kernel_tables, loop_settings
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """Runs of one structure and timing that differ in the tunable slots alone. Each is equal to itself only.
+
+    tunable   keys of these slots;  baked  values of all slots, those of the tunable ones are not used
+    settings  of the loop, with the rows of a trajectory (which only kept runs write)
+    """
+
+    structure: Structure
+    sampled: bool
+    tunable: tuple[str, ...]
+    baked: tuple[float, ...]
+    settings: LoopSettings
+    tables: tuple[Table, ...]
+
+    @property
+    def system(self) -> System:
+        """The System of the structure."""
+        return program(self.structure).system
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Slot keys in the order of the columns that a run takes; a tunable slot that nothing reads has none."""
+        return self._emission[1]
+
+    @property
+    def identity(self) -> str:
+        """Hash of all that decides the bits of the results, the same on every machine (whatever its vector width)."""
+        return self._emission[0]
+
+    @cached_property
+    def _emission(self) -> tuple[str, tuple[str, ...]]:
+        return _emitted(self.structure, self.sampled, self.tunable, self.baked)
+
+    @property
+    def options(self) -> KernelOptions:
+        """How its kernel is printed: what varies is tunable, the rest baked."""
+        return KernelOptions(tunable=self.tunable)
+
+    def kernel(self) -> Kernel:
+        """The kernel, compiled on first need. Raises ToolchainError."""
+        with _COMPILING:
+            return kernel(self.structure, self.sampled, self.options, self.baked)
+
+    def chosen(self, values: Floats) -> Floats:
+        """The columns (runs, parameters) of `values` (runs, slots) that a run takes."""
+        keys = [slot.key for slot in self.system.slots]
+        fixed = np.array([key not in self.tunable for key in keys])
+        if not (values[:, fixed] == np.array(self.baked)[fixed]).all():
+            raise AssertionError("a slot that was taken for constant varies")
+        return values[:, [keys.index(key) for key in self.parameters]]
+
+
+# Several threads want the first chunk's kernel at once, and CasADi is not made for that.
+_COMPILING = Lock()
+
+
+@lru_cache(maxsize=512)
+def _emitted(
+    structure: Structure, sampled: bool, tunable: tuple[str, ...], baked: tuple[float, ...]
+) -> tuple[str, tuple[str, ...]]:
+    slots = program(structure).system.slots
+    constants = {slot.key: value for slot, value in zip(slots, baked, strict=True) if slot.key not in tunable}
+    emission = lanes.emit(program(structure), constants, 1)
+    text = canonical_json({**runtime_sources(), "kernel.h": emission.text, "sampled": sampled})
+    return sha256(text).hexdigest(), emission.tunable
+
+
+def work_for(scenario: Scenario, tunable: Sequence[str], values: Floats) -> Work:
+    """The Work of a scenario: `values` (slots,) are those of all slots, of which `tunable` may vary."""
+    return Work(
+        scenario.structure(),
+        scenario.control_every > 0,
+        tuple(tunable),
+        tuple(float(value) for value in values),
+        loop_settings(scenario, trajectory=True),
+        tuple(kernel_tables(scenario.tables())),
+    )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Results of a chunk: the Runs of all, and of each kept run its trajectory (rows, columns)."""
+
+    runs: Runs
+    trajectories: tuple[Floats, ...] = ()
+
+
+def perform(
+    loop: Kernel,
+    settings: LoopSettings,
+    tables: Sequence[Table],
+    parameters: Floats,
+    kept: Sequence[int] = (),
+    control: Control | None = None,
+) -> Outcome:
+    """Simulate one run per row of `parameters`, in this thread; those at `kept` with their trajectory.
+
+    A kept run is simulated twice, for a trajectory slows a whole pack down; the bits are the same.
+    """
+    runs = loop.run(parameters, replace(settings, output_every=0), tables, control=control)
+    trajectories: list[Floats] = []
+    for first in range(0, len(kept), loop.width):
+        pack = loop.run(parameters[list(kept[first : first + loop.width])], settings, tables)
+        assert pack.trajectory is not None and pack.rows is not None
+        trajectories += [rows[:count].copy() for rows, count in zip(pack.trajectory, pack.rows, strict=True)]
+    return Outcome(runs, tuple(trajectories))
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A Work as it travels to a worker: the kernel's sources, with their hash, instead of a compiled library."""
+
+    structure: Structure
+    source: KernelSource
+    hash: str
+    settings: LoopSettings
+    tables: tuple[Table, ...]
+
+
+@lru_cache(maxsize=16)
+def parcel(work: Work) -> Parcel:
+    """Pack a Work. Raises ToolchainError where there is no compiler to say how wide vectors are."""
+    with _COMPILING:
+        source = print_kernel(program(work.structure), work.sampled, work.options, work.baked)
+    return Parcel(work.structure, source, source.hash, work.settings, work.tables)
+
+
+def perform_parcel(parcel: Parcel, parameters: Floats, kept: Sequence[int] = ()) -> Outcome:
+    """`perform` in a worker: its kernel is compiled from the parcel's sources once, then taken from its cache.
+
+    Raises ValueError if the sources are not those that were sent, ToolchainError if they cannot be compiled here.
+    """
+    return perform(_received(parcel), parcel.settings, parcel.tables, parameters, kept)
+
+
+_received_kernels: dict[str, Kernel] = {}
+
+
+def _received(parcel: Parcel) -> Kernel:
+    if parcel.source.hash != parcel.hash:
+        raise ValueError("the kernel's sources were damaged on the way to this worker")
+    with _COMPILING:
+        if parcel.hash not in _received_kernels:
+            _received_kernels[parcel.hash] = Kernel(program(parcel.structure), parcel.source)
+        return _received_kernels[parcel.hash]

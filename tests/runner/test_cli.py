@@ -1,0 +1,519 @@
+"""The command line as its users meet it: outputs, messages, exit codes, and what is never written."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from springline.codegen.kernel import kernel
+from springline.model.sliding import LAWS
+from springline.runner import paper, terminal
+from springline.runner.claims import Check, Finding
+from springline.runner.cli import app
+from springline.runner.commands import run as run_command
+from springline.runner.scenario import load_scenario, packaged_scenarios
+from springline.runner.simulate import simulate
+from springline.runner.storage import read_table, units
+
+MAIN = "from springline.runner.cli import main; main()"
+FIGURES = {"tracking", "error", "force", "sliding", "springs", "steady_state", "base_motion"}
+SHORT = """\
+[base_motion]
+kind = "sine"
+shake = [{ amplitude = 0.1, omega = 10.0 }]
+
+[simulation]
+duration = 0.5
+output_every = 100
+"""
+
+
+def springline(*arguments: str | Path) -> Result:
+    """Run a command in this process."""
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="springline")
+
+
+def done(*arguments: str | Path) -> str:
+    """What a command that must succeed prints."""
+    result = springline(*arguments)
+    assert result.exit_code == 0, result.stderr
+    return result.stdout
+
+
+def refused(*arguments: str | Path, code: int = 2) -> str:
+    """What a command that must fail tells the user."""
+    result = springline(*arguments)
+    assert result.exit_code == code, (result.exit_code, result.stderr, result.exception)
+    assert isinstance(result.exception, SystemExit)
+    assert "Traceback" not in result.output
+    assert result.stdout == ""
+    return result.stderr
+
+
+def contents(folder: Path) -> dict[str, str]:
+    """Every file below `folder` -> its hash."""
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A current folder of the test's own, with a short scenario in it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of short.toml, figures included."""
+    folder = tmp_path_factory.mktemp("results")
+    (folder / "short.toml").write_text(SHORT, encoding="utf-8")
+    done("run", folder / "short.toml", "-o", folder / "out")
+    return folder / "out"
+
+
+# --- run -------------------------------------------------------------------------------------------------
+
+
+def test_run_writes_scenario_tables_and_figures(results: Path) -> None:
+    figures = {f"figures/{name}.{form}" for name in FIGURES for form in ("png", "svg")}
+    assert set(contents(results)) == {"scenario.toml", "trajectory.parquet", "metrics.parquet"} | figures
+
+
+def test_run_stores_what_simulate_gives_with_units(results: Path) -> None:
+    expected = simulate(load_scenario("short.toml"))
+    for name, table in (("trajectory", expected.trajectory), ("metrics", expected.metrics)):
+        stored = read_table(results / f"{name}.parquet")
+        assert stored.equals(table)
+        assert units(stored) == units(table)
+    assert units(read_table(results / "trajectory.parquet"))["U_rotation"] == "N m"
+
+
+def test_run_writes_a_scenario_that_repeats_it(results: Path) -> None:
+    assert load_scenario(results / "scenario.toml") == load_scenario("short.toml")
+
+
+def test_another_process_writes_the_same_bytes(results: Path) -> None:
+    subprocess.run(
+        [sys.executable, "-c", MAIN, "run", "short.toml", "-o", "again"],
+        env=os.environ | {"PYTHONHASHSEED": "1", "COLUMNS": "40"},
+        capture_output=True,
+        check=True,
+    )
+    assert contents(Path("again")) == contents(results)
+
+
+def test_the_engines_write_the_same_bytes(results: Path) -> None:
+    done("run", "short.toml", "-o", "casadi", "--engine", "casadi", "--no-plot")
+    written = contents(Path("casadi"))
+    assert set(written) == {"scenario.toml", "trajectory.parquet", "metrics.parquet"}
+    assert written.items() <= contents(results).items()
+
+
+def test_run_shows_metrics_with_units_and_where_the_results_are() -> None:
+    shown = done("run", "short.toml", "-o", "out", "--no-plot")
+    assert re.search(r"settling time +0\.2\d* s +0\.2\d* s", shown)
+    assert re.search(r"U max +\d+ N +\d+ N m", shown)
+    assert "done: 0.5 s in 5000 steps" in shown
+    assert "results: out" in shown
+
+
+@pytest.mark.parametrize(
+    ("scenario", "folder"), [("short.toml", "results/short"), ("paper/nominal", "results/paper/nominal")]
+)
+def test_results_have_a_folder_by_default(scenario: str, folder: str) -> None:
+    done("run", scenario, "--no-plot", "--set", "simulation.duration=0.01")
+    assert Path(folder, "metrics.parquet").exists()
+
+
+def test_set_overrides_the_scenario() -> None:
+    done(
+        "run", "short.toml", "-o", "out", "--no-plot", "--set", "control.mu=[10.0, 4.0]", "--set", 'control.law="power"'
+    )
+    used = load_scenario(Path("out/scenario.toml"))
+    assert used.document["control"]["mu"] == [10.0, 4.0]
+    assert used.structure().law == "power"
+
+
+def test_csv_has_the_same_numbers_and_units_beside_it(results: Path) -> None:
+    done("run", "short.toml", "-o", "out", "--no-plot", "--format", "csv")
+    tables = {f"{name}.{end}" for name in ("trajectory", "metrics") for end in ("csv", "units.json")}
+    assert set(contents(Path("out"))) == {"scenario.toml"} | tables
+    for name in ("trajectory", "metrics"):
+        read, expected = read_table(Path("out", f"{name}.csv")), read_table(results / f"{name}.parquet")
+        assert read.equals(expected)
+        assert units(read) == units(expected)
+
+
+def test_run_prints_json_and_nothing_else() -> None:
+    answer = json.loads(done("run", "short.toml", "-o", "out", "--no-plot", "--json"))
+    assert list(answer) == ["command", "version", "status", "rows", "units"]
+    assert (answer["command"], answer["status"], answer["version"]) == ("run", "ok", terminal.version())
+    metrics = read_table(Path("out/metrics.parquet"))
+    assert answer["rows"] == metrics.to_pylist()
+    assert answer["units"] == units(metrics)
+
+
+def test_a_run_that_diverges_is_a_result() -> None:
+    without_fast = ("run", "paper/nominal", "--no-plot", "--set", "control.fast=false")
+    shown = done(*without_fast, "-o", "out")
+    (row,) = read_table(Path("out/metrics.parquet")).to_pylist()
+    assert row["status"] == "out_of_bounds"
+    assert row["settling_time_lift"] is None
+    assert re.search(rf"dq2_rotation left its bound .* results end at t = {row['t_end']:g} s", shown)
+    assert re.search(r"settling time +– +–", shown)
+    answer = json.loads(done(*without_fast, "-o", "again", "--json"))
+    assert answer["status"] == answer["rows"][0]["status"] == "out_of_bounds"
+
+
+# --- what the user got wrong -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["nowhere.toml"], "nowhere.toml"),
+        (["paper/group1_shak"], "did you mean 'paper/group1_shake'?"),
+        (["short.toml", "--set", "control.delt=0.1"], "did you mean 'delta'?"),
+        (["short.toml", "--set", "control.delta"], "expected KEY=VALUE"),
+        (["short.toml", "--set", "control.law=power"], "quotes"),
+        (["short.toml", "--set", "mechanism.m3=-1.0"], "mechanism.m3: expected a number > 0 [kg]"),
+        (["short.toml", "--set", "simulation.duration=0.50005"], "whole multiple"),
+        (["short.toml", "--format", "xlsx"], "xlsx"),
+        (["short.toml", "--engine", "fortran"], "fortran"),
+        (["short.toml", "--stiff"], "--stiff"),
+        ([], "scenario"),
+        (["short.toml", "-o", "short.toml"], "is a file"),
+        (["short.toml", "-o", "short.toml/out"], "short.toml: is a file"),
+    ],
+)
+def test_wrong_input_is_explained_and_nothing_written(elsewhere: Path, arguments: list[str], told: str) -> None:
+    assert told.lower() in refused("run", *arguments).lower()
+    assert list(contents(elsewhere)) == ["short.toml"]
+
+
+def test_every_mistake_of_a_file_is_told_at_once(elsewhere: Path) -> None:
+    Path("bad.toml").write_text("[control]\nl = 2\nk1 = nan\n[drive]\nk_s2 = 'stiff'\n", encoding="utf-8")
+    told = refused("run", "bad.toml")
+    assert all(f"bad.toml: {key}: expected" in told for key in ("control.l", "control.k1", "drive.k_s2"))
+    assert set(contents(elsewhere)) == {"short.toml", "bad.toml"}
+
+
+def test_a_folder_that_holds_something_is_refused() -> None:
+    Path("out").mkdir()
+    Path("out/notes.txt").write_text("mine", encoding="utf-8")
+    assert "--force" in refused("run", "short.toml", "-o", "out")
+    assert list(contents(Path("out"))) == ["notes.txt"]
+
+
+def test_force_replaces_results_and_only_results(results: Path) -> None:
+    shutil.copytree(results, "out")
+    Path("out/notes.txt").write_text("mine", encoding="utf-8")
+    done("run", "short.toml", "-o", "out", "--no-plot", "--format", "csv", "--force")
+    left = {
+        "notes.txt",
+        "scenario.toml",
+        "trajectory.csv",
+        "trajectory.units.json",
+        "metrics.csv",
+        "metrics.units.json",
+    }
+    assert set(contents(Path("out"))) == left
+    assert not Path("out/figures").exists()
+
+
+def test_force_does_not_replace_what_the_run_reads() -> None:
+    done("run", "short.toml", "-o", "out", "--no-plot")
+    before = contents(Path("out"))
+    changed = ("--set", "control.delta=0.1", "--no-plot", "--force")
+    assert "scenario.toml" in refused("run", "out/scenario.toml", "-o", "out", *changed)
+    assert contents(Path("out")) == before
+
+
+def test_force_does_not_replace_a_record_that_the_run_reads() -> None:
+    Path("out").mkdir()
+    record = "\n".join(["t,y", *(f"{0.1 * k:.1f},{0.01 * k}" for k in range(10))])
+    Path("out/trajectory.csv").write_text(record, encoding="utf-8")
+    moving = (
+        'base_motion={ kind = "table", path = "out/trajectory.csv", columns = { t = "t", shake = "y" }, ends = "hold" }'
+    )
+    told = refused("run", "short.toml", "-o", "out", "--force", "--set", moving)
+    assert "trajectory.csv" in told
+    assert Path("out/trajectory.csv").read_text(encoding="utf-8") == record
+
+
+# --- failures that are not the user's fault --------------------------------------------------------------
+
+
+@pytest.fixture
+def no_compiler(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A machine on which the compiler does not work."""
+    kernel.cache_clear()
+    monkeypatch.setenv("CC", "/nowhere/cc")
+    yield
+    kernel.cache_clear()
+
+
+@pytest.mark.usefixtures("no_compiler")
+def test_without_a_compiler_one_sentence_says_so() -> None:
+    told = refused("run", "short.toml", "-o", "out", code=1)
+    assert told.count("\n") == 1
+    assert "/nowhere/cc" in told
+    assert not Path("out").exists()
+
+
+def test_a_full_disk_is_one_sentence_and_no_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    assert (
+        refused("run", "short.toml", "-o", "out", "--no-plot", code=1) == "Error: [Errno 28] No space left on device\n"
+    )
+    assert not Path("out").exists()
+
+
+def test_ctrl_c_ends_a_run_at_once_and_writes_nothing(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    @contextlib.contextmanager
+    def interrupted(text: str, *, quiet: bool = False) -> Iterator[Callable[[float], None]]:
+        yield lambda share: signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(run_command, "progress", interrupted)
+    start = time.monotonic()
+    assert refused("run", "short.toml", "--set", "simulation.duration=500.0", code=130) == "stopped\n"
+    assert time.monotonic() - start < 10.0  # the whole run takes longer
+    assert list(contents(elsewhere)) == ["short.toml"]
+
+
+# --- progress --------------------------------------------------------------------------------------------
+
+
+class Screen(io.StringIO):
+    """A terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def watched(stream: io.StringIO, monkeypatch: pytest.MonkeyPatch, patience: float) -> str:
+    """What appears on stdout during work of some tenths of a second."""
+    monkeypatch.setattr(terminal, "_PATIENCE", patience)
+    monkeypatch.setattr(sys, "stdout", stream)
+    monkeypatch.setenv("TERM", "xterm")
+    with terminal.progress("simulating") as report:
+        for share in (0.2, 0.4, 0.6):
+            time.sleep(0.1)
+            report(share)
+    return stream.getvalue()
+
+
+def test_a_bar_appears_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "simulating" in watched(Screen(), monkeypatch, 0.05)
+
+
+def test_no_bar_for_what_is_quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert watched(Screen(), monkeypatch, 60.0) == ""
+
+
+def test_no_bar_in_a_pipe(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert watched(io.StringIO(), monkeypatch, 0.0) == ""
+
+
+# --- generate, export ------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("generated") / "c"
+    done("generate", "-o", folder)
+    return folder
+
+
+def test_generate_writes_what_its_manifest_lists(generated: Path) -> None:
+    manifest = json.loads((generated / "manifest.json").read_bytes())
+    listed = {entry["path"]: entry["sha256"] for entry in manifest["files"]}
+    written = contents(generated)
+    assert written.pop("manifest.json")
+    assert written == listed
+    assert "src/springline_model.c" in written
+
+
+def test_generate_is_for_the_nominal_scenario_and_export_writes_the_same(generated: Path) -> None:
+    done("export", "c", "paper/nominal", "-o", "c")
+    assert contents(Path("c")) == contents(generated)
+
+
+def test_check_finds_an_up_to_date_folder_so(generated: Path) -> None:
+    assert "up to date" in done("generate", "-o", generated, "--check")
+
+
+def test_check_names_what_is_stale_and_writes_nothing(generated: Path) -> None:
+    before = contents(generated)
+    stale = springline("generate", "paper/group2_power", "-o", generated, "--check")
+    assert stale.exit_code == 1
+    assert re.search(r"changed +src/springline_model\.c: \d+ of \d+ lines", stale.stdout)
+    as_json = springline("generate", "paper/group2_power", "-o", generated, "--check", "--json")
+    assert as_json.exit_code == 1
+    answer = json.loads(as_json.stdout)
+    assert answer["status"] == "stale"
+    assert ("src/springline_model.c", "changed") in [(row["path"], row["kind"]) for row in answer["rows"]]
+    assert contents(generated) == before
+
+
+def test_generate_replaces_its_own_files_only() -> None:
+    rows = json.loads(done("generate", "-o", "c", "--json"))["rows"]
+    assert {row["change"] for row in rows} == {"written"}
+    edited = Path("c/src/springline_model.c")
+    edited.write_text("mine", encoding="utf-8")
+    told = refused("generate", "paper/group2_power", "-o", "c")
+    assert "src/springline_model.c: edited since springline wrote it" in told
+    assert edited.read_text(encoding="utf-8") == "mine"
+    done("generate", "paper/group2_power", "-o", "c", "--force")
+    assert "power" in edited.read_text(encoding="utf-8")
+    assert "up to date" in done("generate", "paper/group2_power", "-o", "c", "--check")
+
+
+def test_generate_renames_and_frees_what_it_is_told_to() -> None:
+    done("generate", "-o", "c", "--prefix", "arm", "--tunable", "control.k1, control.mu")
+    manifest = json.loads(Path("c/manifest.json").read_bytes())
+    free = [entry["name"] for entry in manifest["parameters"] if entry["binding"] == "run"]
+    assert free == ["control.k1", "control.mu.0", "control.mu.1"]
+    assert Path("c/src/arm_model.c").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--tunable", "control.kk"], "no parameter 'control.kk'"),
+        (["--prefix", "9lives"], "9lives"),
+        (["--real", "half"], "half"),
+        (["nowhere"], "nowhere"),
+        (["-o", "short.toml"], "is a file"),
+    ],
+)
+def test_generate_refuses_wrong_input(elsewhere: Path, arguments: list[str], told: str) -> None:
+    assert told in refused("generate", *arguments)
+    assert list(contents(elsewhere)) == ["short.toml"]
+
+
+# --- reproduce -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[object]:
+    """A paper that is reproduced at once (tests/runner/test_paper.py has the real one); what the command asked for."""
+    seen: list[object] = []
+    row = {"group": 2, "case": "power", "joint": "lift", "measure": "settling_time", "unit": "s"}
+
+    def reproduce(folder: Path, groups: list[int] | None = None, *, progress: object = None) -> paper.Reproduction:
+        seen.extend([folder, groups])
+        finding = Finding(3, "the new law is the fastest", (Check("yes", True),), ())
+        return paper.Reproduction(folder, (finding,), ({**row, "printed": 0.76, "value": None, "change": None},), None)
+
+    monkeypatch.setattr(paper, "reproduce", reproduce)
+    return seen
+
+
+def test_reproduce_shows_the_paper_beside_ours_and_verdicts(asked: list[object]) -> None:
+    shown = done("reproduce", "-o", "report", "--group", "2", "--group", "4")
+    assert re.search(r"2 power +lift +settling time +0\.76 s +–", shown)
+    assert re.search(r"3 +the new law is the fastest +holds", shown)
+    assert "report: report/report.html" in shown
+    assert asked == [Path("report"), [2, 4]]
+
+
+def test_reproduce_prints_json(asked: list[object]) -> None:
+    answer = json.loads(done("reproduce", "--json"))
+    assert (answer["command"], answer["status"]) == ("reproduce", "ok")
+    assert answer["rows"][0]["value"] is None
+    assert asked == [Path("reproduction"), None]
+
+
+def test_reproduce_refuses_wrong_input(elsewhere: Path) -> None:
+    assert "'7' (valid: 1, 2, 3, 4)" in refused("reproduce", "--group", "7")
+    assert "is a file" in refused("reproduce", "-o", "short.toml")
+    assert list(contents(elsewhere)) == ["short.toml"]
+
+
+# --- list, doctor, and the rest --------------------------------------------------------------------------
+
+
+def rows_of(what: str) -> list[dict[str, object]]:
+    answer = json.loads(done("list", what, "--json"))
+    assert list(answer) == ["command", "version", "status", "rows", "units"]
+    rows: list[dict[str, object]] = answer["rows"]
+    shown = done("list", what)
+    first = next(iter(rows[0]))
+    assert all(str(row[first]) in shown for row in rows)
+    return rows
+
+
+def test_list_parameters_tells_all_that_the_model_declares() -> None:
+    rows = {row["key"]: row for row in rows_of("parameters")}
+    assert all(row["unit"] and row["meaning"] and row["bounds"] for row in rows.values())
+    assert rows["control.U_max"]["default"] == ["inf", "inf"]
+    assert rows["control.K_f"]["unit"] == ["N s/m", "N m s/rad"]
+    assert rows["control.delta"]["unit"] == "m or rad"
+    slots = load_scenario("paper/nominal").system().slots
+    numbered = {slot.key for slot in slots if slot.key.partition(".")[0] in {"mechanism", "drive", "control"}}
+    assert {re.sub(r"\.\d$", "", key) for key in numbered} == set(rows)
+
+
+def test_list_laws_and_mechanisms() -> None:
+    assert {row["name"] for row in rows_of("laws")} == set(LAWS)
+    assert [row["name"] for row in rows_of("mechanisms")] == ["transfer_manipulator"]
+
+
+def test_list_scenarios_has_a_title_for_each() -> None:
+    rows = {row["name"]: row["title"] for row in rows_of("scenarios")}
+    assert list(rows) == list(packaged_scenarios())
+    assert all(rows.values())
+
+
+def test_doctor_finds_this_machine_well() -> None:
+    assert "lanes and casadi give the same bits" in done("doctor")
+
+
+@pytest.mark.usefixtures("no_compiler")
+def test_doctor_says_what_is_missing() -> None:
+    sick = springline("doctor", "--json")
+    assert sick.exit_code == 1
+    answer = json.loads(sick.stdout)
+    assert answer["status"] == "failed"
+    assert [row["name"] for row in answer["rows"] if not row["ok"]] == ["C compiler"]
+
+
+def test_version_and_help() -> None:
+    assert done("--version") == f"springline {terminal.version()}\n"
+    shown = done("--help")
+    assert all(f"  {command} " in shown for command in ("run", "generate", "export", "reproduce", "list", "doctor"))
+
+
+def test_version_and_help_wait_for_no_library() -> None:
+    """CasADi, Arrow and Matplotlib take seconds to import."""
+    code = (
+        "import sys; from springline.runner.cli import app\n"
+        "try: app(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print(sorted({'casadi', 'matplotlib', 'pyarrow', 'scipy', 'pydantic'} & set(sys.modules)))"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert shown.splitlines()[-1] == "[]"

@@ -1,0 +1,141 @@
+"""Figures: which there are, that they can be read, and that they are the same bytes every time."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from springline.runner.plots import draw, envelope, figure_files, house_style, label, legend_above, panels, run_figures
+from springline.runner.scenario import Scenario, load_scenario
+from springline.runner.simulate import Result, simulate
+
+ALWAYS = {"tracking", "error", "force", "sliding", "springs"}
+
+Run = tuple[Scenario, Result]
+
+
+def simulated(name: str, **overrides: object) -> Run:
+    scenario = load_scenario(name, {key.replace("__", "."): value for key, value in overrides.items()})
+    return scenario, simulate(scenario)
+
+
+@pytest.fixture(scope="module")
+def at_rest() -> Run:
+    return simulated("paper/nominal", simulation__duration=0.5)
+
+
+@pytest.fixture(scope="module")
+def at_sea() -> Run:
+    return simulated("ship/vessel_10hz", simulation__duration=2.0)
+
+
+@pytest.fixture(scope="module")
+def diverged() -> Run:
+    return simulated("paper/nominal", control__fast=False)
+
+
+def test_figures_of_a_run(at_rest: Run) -> None:
+    assert set(run_figures(*at_rest)) == ALWAYS | {"steady_state"}
+
+
+def test_a_recorded_base_motion_is_set_against_the_error(at_sea: Run) -> None:
+    figures = run_figures(*at_sea)
+    assert set(figures) == ALWAYS | {"steady_state", "base_motion", "error_over_base", "error_against_base"}
+    assert [axes.get_ylabel() for axes in figures["base_motion"].axes] == ["shake [m]", "pitch [rad]", "roll [rad]"]
+    assert len(figures["error_against_base"].axes) == 6
+
+
+def test_a_run_that_stopped_says_so_and_when(diverged: Run) -> None:
+    figures = run_figures(*diverged)
+    assert set(figures) == ALWAYS
+    end = diverged[1].metrics["t_end"][0].as_py()
+    for figure in figures.values():
+        assert f"out of bounds at {end:g} s" in legend_names(figure)
+
+
+def test_a_run_that_starts_on_its_reference_has_no_bands() -> None:
+    figures = run_figures(*simulated("paper/nominal", simulation__duration=0.1, initial__q=[0.0, 1.0]))
+    assert not any("|e(0)|" in name for name in legend_names(figures["error"]))
+
+
+def test_tracking_shows_link_and_reference(at_rest: Run) -> None:
+    scenario, result = at_rest
+    lift = run_figures(scenario, result)["tracking"].axes[0]
+    drawn = {line.get_label(): line.get_ydata() for line in lift.lines}
+    assert np.array_equal(drawn["link q₁"], result.trajectory["q1_lift"].to_numpy())
+    assert np.array_equal(drawn["reference"], result.trajectory["q1d_lift"].to_numpy())
+
+
+def legend_names(figure: Figure) -> list[str]:
+    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+
+
+@pytest.mark.parametrize("run", ["at_rest", "at_sea", "diverged"])
+def test_every_figure_can_be_read(run: str, request: pytest.FixtureRequest) -> None:
+    """Units on the axes, no word beyond the edge, no legend over data."""
+    for name, figure in run_figures(*request.getfixturevalue(run)).items():
+        with house_style():
+            figure.draw_without_rendering()
+        page = figure.bbox.padded(1.0)
+        bottom = [axes for axes in figure.axes if axes.get_xlabel()]
+        assert bottom and all("[" in axes.get_xlabel() for axes in bottom), name
+        left = [axes for axes in figure.axes if axes.get_ylabel()]
+        assert left and all("[" in axes.get_ylabel() for axes in left), name
+        for axes in figure.axes:
+            for word in (axes.xaxis.label, axes.yaxis.label):
+                box = word.get_window_extent()
+                assert page.containsx(box.x0) and page.containsx(box.x1), (name, word)
+                assert page.containsy(box.y0) and page.containsy(box.y1), (name, word)
+            for legend in figure.legends:
+                box = legend.get_window_extent()
+                assert page.containsx(box.x0) and page.containsx(box.x1), name
+                assert not box.overlaps(axes.get_window_extent()), name
+
+
+def test_the_same_run_gives_the_same_bytes_whatever_the_users_settings(at_rest: Run) -> None:
+    def tracking() -> dict[str, bytes]:
+        return figure_files("tracking", run_figures(*at_rest)["tracking"])
+
+    first = tracking()
+    with mpl.rc_context({"font.size": 30, "lines.linewidth": 9, "svg.hashsalt": "other", "text.color": "red"}):
+        assert tracking() == first
+        assert mpl.rcParams["font.size"] == 30
+    assert first["tracking.png"].startswith(b"\x89PNG")
+    assert b"<svg" in first["tracking.svg"] and b"dc:date" not in first["tracking.svg"]
+
+
+def test_envelope_keeps_ends_and_extremes() -> None:
+    t = np.linspace(0.0, 1.0, 100_000)
+    y = np.sin(5e4 * t)
+    y[54_321] = 7.0
+    thin_t, thin_y = envelope(t, y, 100)
+    assert len(thin_y) <= 202
+    assert thin_y.max() == 7.0 and thin_y.min() == y.min()
+    assert (thin_t[0], thin_t[-1]) == (0.0, 1.0)
+    assert np.all(np.diff(thin_t) > 0)
+    assert np.all(np.interp(thin_t, t, y) == thin_y)
+
+
+def test_envelope_leaves_a_short_record_alone() -> None:
+    t = np.arange(10.0)
+    assert np.array_equal(envelope(t, t**2), (t, t**2))
+
+
+@pytest.mark.parametrize(
+    ("unit", "expected"),
+    [("m/s^2", "x [m/s²]"), ("N m", "x [N · m]"), ("1", "x"), ("", "x"), ("kg m^2", "x [kg · m²]")],
+)
+def test_label(unit: str, expected: str) -> None:
+    assert label("x", unit) == expected
+
+
+def test_legend_lists_a_name_once_and_only_named_lines() -> None:
+    with house_style():
+        figure, grid = panels(2)
+        for axes in grid[:, 0]:
+            draw(axes, np.arange(3.0), np.arange(3.0), "named")
+            draw(axes, np.arange(3.0), np.arange(3.0))
+        legend_above(figure)
+    assert legend_names(figure) == ["named"]
