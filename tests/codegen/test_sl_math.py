@@ -39,10 +39,25 @@ LISTED = {
     "p2": 2.0,
     "p3": 3.0,
 }
-CHECKED = ["exp", "expm1", "log", "log1p", "sin", "cos", "tan", "cbrt"]
+CHECKED = ["exp", "expm1", "sinh", "cosh", "log", "log1p", "sin", "cos", "tan", "cbrt"]
 CHECKED += [f"pow_{name}" for name in ("p1_3", "m1_3", "p2_3", "m2_3", "p1_2", "m1_2", "p3_2")]
-PLAIN = ["sqrt", "fabs", "sign", "floor", "ceil", "sq", "pow_p1", "pow_m1", "pow_p2", "pow_p3"]
-CHECKED_PAIRS = ["pow", "hypot"]
+PLAIN = [
+    "tanh",
+    "atan",
+    "asin",
+    "acos",
+    "sqrt",
+    "fabs",
+    "sign",
+    "floor",
+    "ceil",
+    "sq",
+    "pow_p1",
+    "pow_m1",
+    "pow_p2",
+    "pow_p3",
+]
+CHECKED_PAIRS = ["pow", "hypot", "atan2"]
 PLAIN_PAIRS = ["fmin", "fmax", "copysign"]
 ONE, TWO = [*CHECKED, *PLAIN], [*CHECKED_PAIRS, *PLAIN_PAIRS]
 
@@ -129,7 +144,8 @@ def expected(reference: ctypes.CDLL, arguments: tuple[Floats, Floats]) -> dict[s
 
 INF, NAN, MAX = math.inf, math.nan, sys.float_info.max
 ZEROS = (0.0, -0.0)
-ODD = ("sqrt", "sin", "tan", "expm1", "log1p", "cbrt", "floor", "ceil")
+ODD = ("sqrt", "sin", "tan", "expm1", "log1p", "cbrt", "floor", "ceil", "sinh", "tanh", "atan", "asin")
+PI = math.pi
 
 ANNEX_F_ONE: list[tuple[str, float, float]] = [
     *((name, zero, zero) for name in ODD for zero in ZEROS),
@@ -140,6 +156,20 @@ ANNEX_F_ONE: list[tuple[str, float, float]] = [
     *((name, x, NAN) for name in ("sqrt", "log") for x in (-1.0, -5e-324, -INF)),
     *(("cos", zero, 1.0) for zero in ZEROS),
     *(("exp", zero, 1.0) for zero in ZEROS),
+    *((name, x, NAN) for name in ("asin", "acos") for x in (1.5, -math.nextafter(1, 2), INF, -INF)),
+    *(("cosh", x, INF) for x in (INF, -INF, 711.0)),
+    ("cosh", -0.0, 1.0),
+    *(("sinh", x, x) for x in (INF, -INF, 5e-324, -1e-310)),
+    ("sinh", -711.0, -INF),
+    *(("tanh", x, math.copysign(1.0, x)) for x in (INF, -INF, 1e300, -40.0)),
+    ("tanh", -5e-324, -5e-324),
+    *(("atan", x, math.copysign(PI / 2, x)) for x in (INF, -INF, 1e300, -1e17)),
+    ("atan", 1.0, PI / 4),
+    ("asin", 1.0, PI / 2),
+    ("asin", -1.0, -PI / 2),
+    ("acos", 1.0, 0.0),
+    ("acos", 0.0, PI / 2),
+    ("acos", -1.0, PI),
     ("exp", -INF, 0.0),
     ("exp", 710.0, INF),
     ("exp", -746.0, 0.0),
@@ -203,6 +233,18 @@ ANNEX_F_TWO: list[tuple[str, float, float, float]] = [
     ("pow", 5e-324, 0.5, 2.0**-537),
     ("pow", 10.0, 2.0, 100.0),
     *(("hypot", x, y, INF) for x in (INF, -INF) for y in (NAN, 0.0, 1.0, -INF)),
+    *(("atan2", zero, x, zero) for zero in ZEROS for x in (0.0, 5e-324, 2.0, INF)),
+    *(("atan2", zero, x, math.copysign(PI, zero)) for zero in ZEROS for x in (-0.0, -5e-324, -2.0, -INF)),
+    *(("atan2", y, zero, math.copysign(PI / 2, y)) for y in (5e-324, -3.0, INF, -INF) for zero in ZEROS),
+    *(("atan2", y, -INF, math.copysign(PI, y)) for y in (2.0, -MAX)),
+    *(("atan2", y, INF, math.copysign(0.0, y)) for y in (2.0, -MAX)),
+    *(("atan2", y, x, math.copysign(PI / 2, y)) for y in (INF, -INF) for x in (1.0, -MAX)),
+    *(("atan2", y, INF, math.copysign(PI / 4, y)) for y in (INF, -INF)),
+    *(("atan2", y, -INF, math.copysign(0.75 * PI, y)) for y in (INF, -INF)),
+    *(("atan2", y, x, NAN) for y, x in ((NAN, 1.0), (0.0, NAN), (INF, NAN))),
+    ("atan2", 5e-324, 5e-324, PI / 4),
+    ("atan2", MAX, -MAX, 0.75 * PI),
+    ("atan2", 5e-324, MAX, 0.0),
     ("hypot", NAN, 1.0, NAN),
     ("hypot", -0.0, 0.0, 0.0),
     ("hypot", 3e300, 4e300, 5e300),
@@ -249,7 +291,7 @@ def accuracy() -> ModuleType:
 
 def test_errors_stay_below_two_ulp(accuracy: ModuleType) -> None:
     rows = list(accuracy.measure(samples=400, seed=5))
-    assert {row.case.function for row in rows} >= {*CHECKED, "pow", "hypot"}
+    assert {row.case.function for row in rows} >= {*CHECKED, *CHECKED_PAIRS, "tanh", "atan", "asin", "acos"}
     assert [row for row in rows if not row.error <= 2.0] == []
 
 
