@@ -42,11 +42,13 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
     def call(name: str, *arguments: str, results: Sequence[str]) -> str:
         function = functions[name]
         lines = [
+            "  {",
             f"  const double *arg[{max(function.sz_arg(), 1)}] = {{{', '.join(arguments)}}};",
             f"  double *res[{max(function.sz_res(), 1)}] = {{{', '.join(results)}}};",
             f"  double work[{max(function.sz_w(), 1)}];",
             f"  int integers[{max(function.sz_iw(), 1)}];",
             f"  (void){function.name()}(arg, res, integers, work, 0);",
+            "  }",
         ]
         return "\n".join(lines)
 
@@ -69,26 +71,18 @@ static inline void kernel_start(const sl_group *p, const sl_group *r, sl_group *
 {call("start", p, r, results=["(double *)x"])}
 }}
 
-static inline void kernel_uniform(const double *t, const double *d, sl_v *uniform) {{ (void)t, (void)d, (void)uniform; }}
-
-static inline void kernel_signals_of(double t, const double *d, const sl_group *p, const sl_group *r, sl_group *w) {{
-{call("signals", "&t", "d", p, r, results=["(double *)w"])}
-}}
+static inline void kernel_uniform(const double *t, const double *d, sl_v *uniform) {{}}
 
 /* w and s behind each other: this engine binds every signal per run. */
 static inline void kernel_varying(double t, const double *d, const double *uniform, const sl_group *p,
                                   const sl_group *r, sl_group *varying) {{
-  kernel_signals_of(t, d, p, r, varying);
-  {{
+{call("signals", "&t", "d", p, r, results=["(double *)varying"])}
 {call("time", flat + "varying", p, r, results=["(double *)(varying + SL_NUMBER_W)"])}
-  }}
-  (void)uniform;
 }}
 
 static inline void kernel_signals(sl_time now, const sl_group *p, const sl_group *r, sl_group *q1d,
                                   sl_group *b) {{
   int i;
-  (void)p, (void)r;
   for (i = 0; i < SL_NJ; i++) q1d[i][0] = now.varying[i][0];
   for (i = 0; i < SL_NB; i++) b[i][0] = now.varying[3 * SL_NJ + i][0];
 }}

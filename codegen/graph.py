@@ -18,7 +18,7 @@ from springline.codegen.program import Program
 
 
 class Binding(IntEnum):
-    """When a value becomes known, and for whom: the order in which the emitted functions may use each other's values."""
+    """When a value becomes known, and for whom: emitted functions may use values of earlier times."""
 
     CONSTANT = 0
     RUN = 1

@@ -1,6 +1,6 @@
 """The moving base: what its oscillation b = [y_r1, theta_1z, theta_1x] does to a body that stands on it.
 
-The base frame is moved by y_r1 along the inertial Y and turned by R = Rz(theta_1z) Rx(theta_1x) (erratum E7: pitch, then
+The base frame is moved by y_r1 along the inertial Y and turned by R = Rz(theta_1z) Rx(theta_1x) (E7: pitch, then
 roll about the pitched x axis). The arm feels the base only through what an inertial measurement unit at the base
 origin reads: the angular velocity, its derivative, and the specific force (gravity plus acceleration), in base axes.
 """

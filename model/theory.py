@@ -1,4 +1,4 @@
-"""What the paper proves about the closed loop, as numbers, and where the proof does not reach (docs/paper.md section 6, E9).
+"""What the paper proves about the closed loop, as numbers, and where the proof does not reach (docs/paper.md, E9).
 
 Plain NumPy on numbers of one run; nothing here is symbolic. Vectors have one entry per joint.
 """

@@ -321,10 +321,12 @@ static inline SL_F SL_CHECKED(sinh)(SL_F x SL_OK) {
 }
 
 #ifdef SL_CORES
-/* -e / (2 + e) with e = exp(-2|x|) - 1; 1 to the last bit from 30 on. */
+/* With e = exp(2|x|) - 1: e / (2 + e), which is 1 - 2 / (2 + e), and 1 to the last bit from 30 on. */
 static inline SL_F SL_FN(tanh)(SL_F x) {
-  SL_F lo, e = SL_FN(expm1_sum)(-2.0 * SL_FN(fmin)(SL_FN(set)(30.0), SL_FN(fabs)(x)), &lo), q = e / (2.0 + e);
-  return SL_FN(copysign)(q + lo * (0.5 * (1.0 - q) * (1.0 - q)), x);
+  SL_F lo, a = SL_FN(fabs)(x), e = SL_FN(expm1_sum)(2.0 * SL_FN(fmin)(SL_FN(set)(30.0), a), &lo);
+  SL_M small = a < 0.55;
+  SL_F q = SL_FN(select)(small, e, SL_FN(set)(2.0)) / (2.0 + e);
+  return SL_FN(copysign)(SL_FN(select)(small, q + lo * (0.5 * (1.0 - q) * (1.0 - q)), 1.0 - q), x);
 }
 #endif
 

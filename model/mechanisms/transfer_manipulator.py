@@ -1,7 +1,7 @@
-"""The reference paper's arm: a lift that slides along the base's y axis and a rotation hinged on it (docs/paper.md section 1).
+"""The reference paper's arm: a lift that slides along the base's y axis and a rotation hinged on it.
 
-Guo et al. 2023, J. Mar. Sci. Eng. 11(3) 474, equation (1). In the base frame the lifting part's centroid is at
-(L1, y, 0), the rotating part's at (L1 + L3 cos theta, y + L3 sin theta, 0).
+Guo et al. 2023, J. Mar. Sci. Eng. 11(3) 474, equation (1); docs/paper.md section 1. In base axes the lifting part's
+centroid is at (L1, y, 0), the rotating part's at (L1 + L3 cos theta, y + L3 sin theta, 0).
 """
 
 from __future__ import annotations
