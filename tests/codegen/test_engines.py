@@ -220,3 +220,60 @@ def test_an_operation_without_c_is_refused_by_name(shaken: Program) -> None:
     bad = ca.Function("loop_plant", inputs, [ca.erf(inputs[2])])
     with pytest.raises(lanes.UnprintableOperation, match=r"OP_ERF.*plant"):
         lanes.emit(Program(shaken.system, {**shaken.functions, "plant": bad}), {}, 1)
+
+
+RARE: dict[str, dict[str, float]] = {
+    "angle beyond the fast reduction": {"initial.q.1": 3e5},
+    "exponents other than their defaults": {"control.alpha": 0.6, "control.nu": 4.0},
+    "literal law that starts on the reference": {
+        "control.delta": 0.0, "initial.q.0": 0.0, "initial.q.1": 1.0,
+        "initial.dq.0": np.pi, "initial.dq.1": 0.5 * np.pi,
+    },
+    "no limit": {"control.a_max.0": np.inf, "control.a_max.1": np.inf},
+    "tiny state": {"initial.q.0": 5e-324, "reference.lift.terms.0.amplitude": 1e-310},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", RARE)
+def test_rare_cases_leave_the_fast_path_with_the_same_bits(case: str, shaken: Program, values_of: Values) -> None:
+    """Lanes that need a complete function stand beside lanes that do not."""
+    table = np.stack([values_of(shaken), values_of(shaken, RARE[case]), values_of(shaken)])
+    expected = run(shaken, table, KernelOptions(engine="casadi", flags=("-O2",)))
+    for options in (KernelOptions(width=4, groups=1, flags=("-O2",)), KernelOptions(width=1, groups=2, flags=("-O2",))):
+        assert_same(run(shaken, table, options), expected)
+
+
+def test_the_kernel_is_written_for_a_reader(shaken: Program, values_of: Values) -> None:
+    """Names of the model, sections, operation counts, and what each staged value is."""
+    keys = [slot.key for slot in shaken.system.slots]
+    baked = dict(zip(keys, values_of(shaken), strict=True))
+    del baked["control.delta"]
+    emission = lanes.emit(shaken, baked, 2)
+    for text in (
+        "once per run",
+        "once per time",
+        "at every evaluation",
+        "operations a run",
+        "e_lift_0",
+        "sigma_rotation_1",
+        "sin_q1_rotation",
+        "const sl_v control_delta = p[0][g]",
+        "/* sq(control_delta) */",
+        "slv_sincos_fast",
+    ):
+        assert text in emission.text, text
+    assert emission.tunable == ("control.delta",)
+    assert emission.sizes["p"] == 1
+    assert emission.sizes["varying"] == 0, "nothing that depends on time varies from run to run"
+    assert emission.counts["closed"] < 200
+    assert emission.text == lanes.emit(shaken, baked, 2).text
+
+
+def test_signals_of_its_own_make_a_run_compute_them(shaken: Program, values_of: Values) -> None:
+    """Only what the varied amplitude reaches is computed per run; the reference stays shared."""
+    keys = [slot.key for slot in shaken.system.slots]
+    baked = dict(zip(keys, values_of(shaken), strict=True))
+    del baked["base_motion.shake.0.amplitude"]
+    sizes = lanes.emit(shaken, baked, 1).sizes
+    assert sizes["uniform"] > 5
+    assert 0 < sizes["varying"] < 8
