@@ -203,10 +203,10 @@ class TypedInterface:
 
     def _fields(self, name: str) -> str:
         members = self.structures[name]
-        width = max(len(field.name) for field in members) + 1
+        declarations = [f"{'int' if field.integer else 'springline_real'} {field.name};" for field in members]
+        width = max(map(len, declarations))
         return "\n".join(
-            f"  {'int' if field.integer else 'springline_real'} {field.name + ';':{width}} /* {field.unit} */"
-            for field in members
+            f"  {text:{width}} /* {field.unit} */" for text, field in zip(declarations, members, strict=True)
         )
 
     def _zeros(self, name: str) -> str:

@@ -39,6 +39,7 @@ _ATTEMPTS = 3
 _IN_A_ROW = 3
 _PAUSE = 0.5
 _REFRESH = 0.2
+_ANSWER = "10s"  # for a scheduler to answer
 _CALIBRATION_STEPS = 2000
 _CHUNKS_PER_THREAD = 8
 
@@ -170,7 +171,7 @@ def _client(scheduler: str, stack: contextlib.ExitStack) -> Any:
     else:
         raise InputError(Problem("--scheduler", "", 'expected an address ("tcp://host:port") or local:N', scheduler))
     try:
-        return stack.enter_context(distributed.Client(address, timeout="10s"))
+        return stack.enter_context(distributed.Client(address, timeout=_ANSWER))
     except (OSError, ValueError) as error:
         raise InputError(Problem("--scheduler", "", f"no scheduler answers ({error})", scheduler)) from error
 

@@ -30,6 +30,7 @@ import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -379,13 +380,22 @@ def _is_number(value: object) -> bool:
 
 
 def _entries(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
-    """The keys that vary, however the file nests them: a table is an entry if its content is no further table."""
+    """The keys that vary, however the file nests them."""
     for name, entry in table.items():
         key = f"{prefix}{name}"
-        if isinstance(entry, dict) and entry and all(isinstance(item, dict) for item in entry.values()):
+        if isinstance(entry, dict) and entry and not _says_how(entry):
             yield from _entries(entry, f"{key}.")
         else:
             yield key, entry
+
+
+def _says_how(table: Mapping[str, Any]) -> bool:
+    """Whether a table is how a key varies, and not one of further keys; a misspelt word is still a word."""
+    words = (*_KINDS, *_OPTIONS)
+    return any(
+        name in words or (not isinstance(content, dict) and get_close_matches(name, words, n=1, cutoff=0.7))
+        for name, content in table.items()
+    )
 
 
 def _flattened(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:

@@ -312,21 +312,23 @@ static inline SL_F SL_CHECKED(cosh)(SL_F x SL_OK) {
   return r;
 }
 
-/* (e + e / (1 + e)) / 2 with e = exp|x| - 1; lo enters times the derivative. */
+/* (e + e / (1 + e)) / 2 with e + lo = exp|x| - 1; what the roundings of e and 1 + e left over enters to first order. */
 static inline SL_F SL_CHECKED(sinh)(SL_F x SL_OK) {
-  SL_F lo, e = SL_FN(expm1_sum)(SL_FN(fabs)(x), &lo), q = e / (1.0 + e);
-  SL_F r = SL_FN(copysign)(0.5 * (e + (q + lo * (1.0 + (1.0 - q) * (1.0 - q)))), x);
+  SL_F lo, e = SL_FN(expm1_sum)(SL_FN(fabs)(x), &lo), u = 1.0 + e, q = e / u, v = 1.0 - q;
+  SL_F r = 0.5 * (e + (q + (lo * (1.0 + v * v) - q * v * (e - (u - 1.0)))));
+  r = SL_FN(copysign)(r, x);
   SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, sinh_rare, x);
   return r;
 }
 
 #ifdef SL_CORES
-/* With e = exp(2|x|) - 1: e / (2 + e), which is 1 - 2 / (2 + e), and 1 to the last bit from 30 on. */
+/* With e + lo = exp(2|x|) - 1: e / (2 + e), mended likewise, which is 1 - 2 / (2 + e); 1 to the last bit from 30 on. */
 static inline SL_F SL_FN(tanh)(SL_F x) {
-  SL_F lo, a = SL_FN(fabs)(x), e = SL_FN(expm1_sum)(2.0 * SL_FN(fmin)(SL_FN(set)(30.0), a), &lo);
+  SL_F lo, a = SL_FN(fabs)(x), e = SL_FN(expm1_sum)(2.0 * SL_FN(fmin)(SL_FN(set)(30.0), a), &lo), u = 2.0 + e;
   SL_M small = a < 0.55;
-  SL_F q = SL_FN(select)(small, e, SL_FN(set)(2.0)) / (2.0 + e);
-  return SL_FN(copysign)(SL_FN(select)(small, q + lo * (0.5 * (1.0 - q) * (1.0 - q)), 1.0 - q), x);
+  SL_F q = SL_FN(select)(small, e, SL_FN(set)(2.0)) / u, v = 0.5 * (1.0 - q);
+  SL_F r = SL_FN(select)(small, q + v * (2.0 * v * lo - q * (e - (u - 2.0))), 1.0 - q);
+  return SL_FN(copysign)(r, x);
 }
 #endif
 
@@ -550,14 +552,16 @@ static inline SL_F SL_FN(atan)(SL_F x) {
 #ifdef SL_SCALAR
 /* Infinities are compared by kind, zeros lie on an axis, everything else only needs another scale. */
 SL_RARE double sl_atan2_rare(double y, double x) {
-  double a = sl_fabs(y), b = sl_fabs(x), scale = sl_fmax(a, b) > 1.0 ? 0x1p-100 : 0x1p100, r;
+  double a = sl_fabs(y), b = sl_fabs(x), most = sl_fmax(a, b), r;
+  double scale = most > 0x1p1000 ? 0x1p-100 : most < 0x1p-900 ? 0x1p100 : 1.0;
   if (x != x || y != y) return x + y;
   if (a == SL_INF || b == SL_INF) {
     a = sl_true(a == SL_INF);
     b = sl_true(b == SL_INF);
     scale = 1.0;
   }
-  r = a == 0.0 ? 0.0 : b == 0.0 ? 0x1.921fb54442d18p+0 : sl_angle(a * scale, b * scale);
+  if (a != 0.0 && b == 0.0) return sl_copysign(0x1.921fb54442d18p+0, y);
+  r = a == 0.0 ? 0.0 : sl_angle(a * scale, b * scale);
   if ((sl_bits(x) & SL_SIGN_BIT) != 0) r = 0x1.921fb54442d18p+1 - (r - 0x1.1a62633145c07p-53);
   return sl_copysign(r, y);
 }

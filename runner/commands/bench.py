@@ -55,7 +55,7 @@ def bench(
 
 
 def _chosen(only: str, contenders: Sequence[Contender]) -> list[Contender]:
-    """Contenders whose name contains one of the comma-separated words, and springline's defaults, the measure of all."""
+    """Contenders whose name contains one of the comma-separated words, and springline's defaults, their measure."""
     from springline.benchmarks.contenders.ours import is_default
 
     words = [word.strip().lower() for word in only.split(",") if word.strip()] or [""]

@@ -1,0 +1,118 @@
+"""What a sweep costs beyond its kernel, and what a second thread brings: `python -m benchmarks.batch_throughput`.
+
+Three things are timed in turn in one process, several times over, and the best of each counts:
+
+    kernel  the compiled loop alone, called with the same runs by the same number of threads
+    batch   the same runs as a sweep: drawn, simulated, stored in a dataset
+    single  the same sweep with one thread
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from springline.runner.batch import open_pool, processors, run_sweep, versions
+from springline.runner.commands.batch import time_text
+from springline.runner.dataset import Dataset, place
+from springline.runner.plan import Plan
+from springline.runner.sweep import load_sweep
+
+SWEEP = """
+scenario = "paper/nominal"
+method = "sobol"
+samples = {runs}
+
+[set]
+simulation.duration = {duration}
+
+[vary]
+control.delta = {{ log_uniform = [0.03, 0.1] }}
+"""
+
+RUN = 4.0  # s, the run that the projection is for
+MILLION = 1_000_000
+
+
+def kernel_seconds(plan: Plan, threads: int) -> float:
+    """The loop alone: every thread takes packs until there are none."""
+    work = plan.groups[0].work
+    loop, settings = work.kernel(), replace(work.settings, output_every=0)
+    chunks = [plan.chunk(k) for k in range(plan.chunks)]
+    parameters = np.concatenate([plan.parameters(chunk, plan.columns(chunk)) for chunk in chunks])
+    pieces = [parameters[i : i + plan.chunk_size] for i in range(0, len(parameters), plan.chunk_size)]
+    with ThreadPoolExecutor(threads) as pool:
+        start = time.perf_counter()
+        list(pool.map(lambda piece: loop.run(piece, settings, work.tables), pieces))
+        return time.perf_counter() - start
+
+
+def batch_seconds(plan: Plan, threads: int) -> float:
+    """The sweep, from the first draw to the last part on the disk."""
+    with tempfile.TemporaryDirectory() as folder:
+        dataset = Dataset(place(Path(folder)))
+        dataset.begin(plan, versions(), resume=False)
+        with open_pool(threads) as pool:
+            start = time.perf_counter()
+            tally = run_sweep(plan, dataset, pool, set())
+            seconds = time.perf_counter() - start
+    assert tally.done == plan.runs, tally
+    return seconds
+
+
+def measure(runs: int, duration: float, threads: int, repeats: int) -> dict[str, float]:
+    """Best times, runs per second and ratios."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "throughput.toml")
+        file.write_text(SWEEP.format(runs=runs, duration=duration), encoding="utf-8")
+        plan = Plan(load_sweep(file))
+    plan.groups[0].work.kernel()
+    kernel, batch, single = [], [], []
+    for _ in range(repeats):
+        kernel.append(kernel_seconds(plan, threads))
+        batch.append(batch_seconds(plan, threads))
+        single.append(batch_seconds(plan, 1))
+    return {
+        "runs": runs,
+        "duration": duration,
+        "threads": threads,
+        "kernel_runs_per_s": runs / min(kernel),
+        "batch_runs_per_s": runs / min(batch),
+        "single_runs_per_s": runs / min(single),
+        "batch_over_kernel": min(kernel) / min(batch),
+        "threads_over_one": min(single) / min(batch),
+        "million_4s_runs_s": min(batch) / runs * MILLION * RUN / duration,
+    }
+
+
+def main() -> None:
+    """Print the table, or with --json one object."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.batch_throughput", description=__doc__)
+    parser.add_argument("--runs", type=int, default=2048)
+    parser.add_argument("--duration", type=float, default=RUN, help="s simulated per run")
+    parser.add_argument("--threads", type=int, default=processors())
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--json", action="store_true")
+    chosen = parser.parse_args()
+    found = measure(chosen.runs, chosen.duration, chosen.threads, chosen.repeats)
+    if chosen.json:
+        print(json.dumps(found, indent=2))
+        return
+    print(f"{chosen.runs} runs of {chosen.duration:g} s, best of {chosen.repeats}")
+    print(f"  kernel alone, {chosen.threads} threads   {found['kernel_runs_per_s']:10.1f} runs/s")
+    print(f"  batch, {chosen.threads} threads          {found['batch_runs_per_s']:10.1f} runs/s")
+    print(f"  batch, 1 thread           {found['single_runs_per_s']:10.1f} runs/s")
+    print(f"  batch / kernel alone      {found['batch_over_kernel']:10.3f}")
+    print(f"  {chosen.threads} threads / 1             {found['threads_over_one']:10.3f}")
+    print(f"  a million 4 s runs        {time_text(found['million_4s_runs_s']):>10}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""What one core could do at most, and what springline's kernel asks of it.
+
+The roof is the throughput of fused multiply-adds, two floating-point operations each. The kernel's operations are
+counted in the machine code of one evaluation of control and plant, which has no branches: every addition,
+subtraction, multiplication, division, square root, minimum and maximum on double precision vectors counts one for
+each lane, a fused multiply-add two, elementary functions with all that they are made of. Not counted: comparisons,
+selections, conversions, bit operations, loads, and all that is not in the evaluation (the RK4 update, the metrics,
+what depends on time only). springline multiplies and adds separately, so that every machine gives the same bits:
+half the roof is the most it could reach.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import re
+import shutil
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from springline.codegen import toolchain
+from springline.codegen.kernel import Kernel
+
+_CHAINS = 12
+_ROUNDS = 2_000_000
+_SOURCE = Path(__file__).with_name("roofline.c")
+_OPERATION = re.compile(r"v?(add|sub|mul|div|sqrt|min|max|fn?m(?:add|sub)\d*)pd\s")
+_REGISTER_LANES = {"x": 2, "y": 4, "z": 8}
+_EVALUATION = re.compile(r"<kernel_closed(?:\.(?:isra|constprop|part)\.\d+)*>:")  # not its rare paths, nor .cold parts
+
+
+def build() -> Callable[[], float]:
+    """A function that measures once and returns GFLOP/s of one core."""
+    compiler = toolchain.find_compiler()
+    width = toolchain.native_vector_width(compiler)
+    flags = ("-O3", "-std=gnu99", "-ffp-contract=fast", f"-DWIDTH={width}", *toolchain.native_flags(compiler))
+    library = toolchain.build_library({_SOURCE.name: _SOURCE.read_text()}, main=_SOURCE.name, flags=flags)
+    spin = toolchain.load(library).spin
+    spin.argtypes, spin.restype = [ctypes.c_int64, ctypes.c_double, ctypes.c_double], ctypes.c_double
+
+    def measure() -> float:
+        start = time.process_time()
+        spin(_ROUNDS, 0.999, 0.5)
+        return 2.0 * _CHAINS * width * _ROUNDS / (time.process_time() - start) / 1e9
+
+    return measure
+
+
+def flops_per_evaluation(kernel: Kernel) -> float:
+    """Floating-point operations of one evaluation of one run; NaN where the machine code cannot be read.
+
+    That is: no objdump, no x86-64, or a compiler that leaves no function of its own for the evaluation.
+    """
+    objdump = shutil.which("objdump")
+    if objdump is None:
+        return math.nan
+    listing = subprocess.run(
+        [objdump, "-d", "--no-show-raw-insn", kernel.library], capture_output=True, text=True, check=True
+    ).stdout
+    total, inside = 0, False
+    for line in listing.splitlines():
+        if line.endswith(">:"):
+            inside = _EVALUATION.search(line) is not None
+        elif inside and (found := _OPERATION.search(line)):
+            register = re.search(r"%([xyz])mm", line)
+            lanes = _REGISTER_LANES[register[1]] if register else 0
+            total += lanes * (2 if found[1].startswith("f") else 1)
+    return total / kernel.width if total else math.nan

@@ -1,0 +1,522 @@
+"""The exported C as an embedder meets it: warnings, symbols, memory, statuses, limits, and the simulator's bits."""
+
+import ctypes
+import math
+import re
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from springline.codegen.api import generate_files
+from springline.codegen.kernel import KernelOptions, LoopSettings, kernel
+from springline.codegen.manifest import write_tree
+from springline.codegen.typed import STATUS
+from springline.runner import load_scenario
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+STRICT = ["-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror"]
+WARNINGS = ("-std=c99", "-ffp-contract=off", *STRICT, "-Wmissing-prototypes", "-Wstrict-prototypes")
+EXPORTS: dict[str, dict[str, Any]] = {
+    "baked": {},
+    "tunable": {"tunable": ["control", "mechanism.m3", "plant"], "prefix": "arm"},
+    "all": {"tunable": "all", "prefix": "every"},
+    "single": {"real": "float", "prefix": "single"},
+    "single_tunable": {"real": "float", "tunable": "all", "prefix": "loose"},
+}
+Folder = Callable[[str], tuple[Path, str]]
+
+
+@pytest.fixture(scope="module")
+def export(tmp_path_factory: pytest.TempPathFactory) -> Folder:
+    """Folder and prefix of an export by its name in EXPORTS."""
+    root = tmp_path_factory.mktemp("exports")
+    scenario = load_scenario("paper/nominal")
+
+    def folder(name: str) -> tuple[Path, str]:
+        options = EXPORTS[name]
+        if not (root / name).exists():
+            write_tree(root / name, *generate_files(scenario.structure(), scenario.values(), **options))
+        return root / name, options.get("prefix", "springline")
+
+    return folder
+
+
+def compile_c(compiler: str, sources: list[Path], output: Path, *flags: str) -> Path:
+    includes = [
+        f"-I{folder}"
+        for root in {s.parents[1] for s in sources if s.parent.name == "src"}
+        for folder in (root / "include", root / "src")
+    ]
+    command = [compiler, *flags, *includes, *map(str, sources), "-o", str(output)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[:3000]
+    return output
+
+
+def run(*command: str | Path) -> str:
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def sources(folder: Path, prefix: str, *programs: str) -> list[Path]:
+    return [folder / "src" / f"{prefix}.c", folder / "src" / f"{prefix}_model.c", *(folder / p for p in programs)]
+
+
+# --- compilers, symbols, memory ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("name", EXPORTS)
+def test_compiles_without_a_warning_and_passes_its_self_check(
+    name: str, compiler: str, export: Folder, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    folder, prefix = export(name)
+    tool = require_tool(compiler)
+    for level in ("-O0", "-O2") if name == "baked" else ("-O1",):
+        program = compile_c(tool, sources(folder, prefix, "self_check.c"), tmp_path / "check", *WARNINGS, level)
+        assert "1000 control steps and 200 plant steps: all bits" in run(program, folder / "test_vectors.txt")
+    compile_c(tool, [folder / "src" / f"{prefix}.c", folder / "main.c"], tmp_path / "main", *WARNINGS)
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_headers_are_cpp(name: str, export: Folder, require_tool: Callable[..., str]) -> None:
+    folder, prefix = export(name)
+    run(
+        require_tool("g++"),
+        "-std=c++17",
+        *STRICT,
+        "-fsyntax-only",
+        "-x",
+        "c++",
+        folder / "include" / f"{prefix}.h",
+        folder / "src" / f"{prefix}_model.h",
+    )
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_exported_symbols_are_those_of_the_headers(
+    name: str, export: Folder, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    folder, prefix = export(name)
+    declared = set()
+    for header in (folder / "include" / f"{prefix}.h", folder / "src" / f"{prefix}_model.h"):
+        text = without_comments(header)
+        declared |= set(re.findall(r"(\w+)\([^()]*\);", text)) | set(re.findall(r"extern const \w+ (\w+);", text))
+    defined, undefined = set(), set()
+    for source in sources(folder, prefix):
+        unit = compile_c(require_tool("gcc"), [source], tmp_path / "unit.o", *WARNINGS, "-O2", "-c")
+        for line in run(require_tool("nm"), unit).splitlines():
+            *_, kind, symbol = line.split()
+            if kind == "U":
+                undefined.add(symbol)
+            elif kind.isupper():
+                defined.add(symbol)
+    assert defined == declared
+    assert all(symbol.startswith(f"{prefix}_") for symbol in defined)
+    assert undefined <= {"memcpy", "memset", "_GLOBAL_OFFSET_TABLE_"}
+
+
+_DOUBLE_INSTRUCTION = r"\b\w*(?:cvt\w*s[sd]2s[sd]|(?:add|sub|mul|div|sqrt|ucomi|comi|max|min)[sp]d)\b"
+
+
+def without_comments(path: Path) -> str:
+    return re.sub(r"/\*.*?\*/", "", path.read_text(), flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("name", ["baked", "single_tunable"])
+def test_no_writable_data_no_heap_no_double_in_single(
+    name: str, export: Folder, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    folder, prefix = export(name)
+    for source in sources(folder, prefix):
+        unit = compile_c(require_tool("gcc"), [source], tmp_path / "unit.o", *WARNINGS, "-O2", "-c")
+        _, data, bss = run(require_tool("size"), unit).splitlines()[1].split()[:3]
+        assert (data, bss) == ("0", "0")
+        if name == "single_tunable":
+            assert not re.findall(_DOUBLE_INSTRUCTION, run(require_tool("objdump"), "-d", unit))
+            assert not re.search(r"\bdouble\b", without_comments(source))
+    if name == "single_tunable":
+        assert not re.search(r"\bdouble\b", without_comments(folder / "src" / "sl_mathf.h"))
+
+
+def test_single_precision_needs_no_double_on_a_processor_without(
+    export: Folder, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    folder, prefix = export("single")
+    gcc = require_tool("arm-none-eabi-gcc", "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi")
+    board = ["-mthumb", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]
+    for source in sources(folder, prefix):
+        unit = compile_c(gcc, [source], tmp_path / "unit.o", *WARNINGS, *board, "-O2", "-c")
+        undefined = re.findall(r"U (\w+)", run(require_tool("arm-none-eabi-nm"), unit))
+        assert set(undefined) <= {"memcpy", "memset"}  # software double arithmetic would be __aeabi_dadd, …
+
+
+def test_two_exports_in_one_program(export: Folder, tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    (one, first), (two, second) = export("baked"), export("tunable")
+    program = tmp_path / "both.c"
+    program.write_text(
+        f'#include "{first}.h"\n#include "{second}.h"\n#include "{first}_model.h"\n#include "{second}_model.h"\n'
+        f"int main(void) {{\n  {first}_controller a;\n  {second}_controller b;\n"
+        f"  return {first}_init(&a, &{first}_default_config) | {second}_init(&b, &{second}_default_config);\n}}\n"
+    )
+    units = [*sources(one, first), *sources(two, second), program]
+    run(compile_c(require_tool("gcc"), units, tmp_path / "both", *WARNINGS))
+
+
+def test_wrong_builds_are_refused_or_found_out(
+    export: Folder, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    folder, prefix = export("baked")
+    gcc = require_tool("gcc")
+    fast = [gcc, "-ffast-math", f"-I{folder / 'include'}", "-c", str(folder / "src" / f"{prefix}.c"), "-o", "/dev/null"]
+    done = subprocess.run(fast, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "without -ffast-math" in done.stderr
+
+    # One constant in its last bit, as a wrong compiler might have it.
+    broken = tmp_path / "broken"
+    shutil.copytree(folder, broken)
+    source = broken / "src" / f"{prefix}.c"
+    text = source.read_text()
+    assert text.count("29.6 *") >= 1
+    source.write_text(text.replace("29.6 *", f"{math.nextafter(29.6, 30.0)!r} *"))
+    program = compile_c(
+        gcc, sources(broken, prefix, "self_check.c"), tmp_path / "check", "-std=c99", "-ffp-contract=off"
+    )
+    done = subprocess.run([program, folder / "test_vectors.txt"], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert re.search(r"line \d+: \w+ of springline_step is .*; first differing bit: \d+", done.stdout)
+    assert "-ffp-contract=off" in done.stdout
+
+    if "fma" in Path("/proc/cpuinfo").read_text().split():
+        flags = ("-O2", "-std=gnu99", "-mfma", "-ffp-contract=fast")
+        program = compile_c(gcc, sources(folder, prefix, "self_check.c"), tmp_path / "fused", *flags)
+        assert subprocess.run([program, folder / "test_vectors.txt"], capture_output=True, check=False).returncode == 1
+
+
+def test_the_readme_builds_it(export: Folder, tmp_path: Path) -> None:
+    folder = tmp_path / "copy"
+    shutil.copytree(export("baked")[0], folder)
+    [command] = re.findall(r"^    (cc .*)$", (folder / "README.md").read_text(), re.MULTILINE)
+    done = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S602 - what the README says
+    assert done.returncode == 0, done.stderr
+    assert "all bits as expected" in done.stdout
+
+
+# --- calling it ------------------------------------------------------------------------------------------------
+
+
+class Library:
+    """An export as a shared library; structures are read off its header, as an embedder would."""
+
+    def __init__(self, folder: Path, prefix: str, output: Path) -> None:
+        library = compile_c("cc", [folder / "src" / f"{prefix}.c"], output, *FLAGS, "-fPIC", "-shared")
+        self._handle = ctypes.CDLL(str(library))
+        self._prefix = prefix
+        header = without_comments(folder / "include" / f"{prefix}.h")
+        real = ctypes.c_double if f"typedef double {prefix}_real" in header else ctypes.c_float
+        self.types: dict[str, Any] = {"int": ctypes.c_int, f"{prefix}_real": real}
+        for body, name in re.findall(r"typedef struct \w+ \{(.*?)\} (\w+);", header, re.DOTALL):
+            fields = [
+                (field, self.types[kind] * int(count) if count else self.types[kind])
+                for kind, field, count in re.findall(r"(\w+) (\w+)(?:\[(\d+)\])?;", body)
+            ]
+            self.types[name] = type(name, (ctypes.Structure,), {"_fields_": fields})
+        self.real = real
+        getattr(self._handle, f"{prefix}_status_text").restype = ctypes.c_char_p
+        pointer = ctypes.c_void_p
+        getattr(self._handle, f"{prefix}_plant_step").argtypes = [pointer, pointer, pointer, pointer, real]
+        getattr(self._handle, f"{prefix}_signals").argtypes = [pointer, real, pointer, pointer]
+
+    def new(self, name: str) -> Any:
+        return self.types[f"{self._prefix}_{name}"]()
+
+    def array(self, name: str, count: int) -> Any:
+        return (self.types[f"{self._prefix}_{name}"] * count)()
+
+    def default(self) -> Any:
+        return self.types[f"{self._prefix}_config"].in_dll(self._handle, f"{self._prefix}_default_config")
+
+    def __call__(self, name: str, *arguments: Any) -> str:
+        """The status' name."""
+        passed = [ctypes.byref(a) if isinstance(a, ctypes.Structure | ctypes.Array) else a for a in arguments]
+        return STATUS[getattr(self._handle, f"{self._prefix}_{name}")(*passed)][0]
+
+    def text(self, status: int) -> str:
+        return getattr(self._handle, f"{self._prefix}_status_text")(status).decode()
+
+
+@pytest.fixture(scope="module")
+def library(export: Folder, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Library]:
+    made: dict[str, Library] = {}
+
+    def load(name: str) -> Library:
+        if name not in made:
+            made[name] = Library(*export(name), tmp_path_factory.mktemp("library") / f"{name}.so")
+        return made[name]
+
+    return load
+
+
+def fields(structure: Any) -> Iterator[str]:
+    return (name for name, *_ in structure._fields_)
+
+
+def values(structure: Any) -> list[float]:
+    return [getattr(structure, name) for name in fields(structure)]
+
+
+class Case:
+    """A ready controller with plausible inputs."""
+
+    def __init__(self, library: Library, fallback: int = 0, **parameters: float) -> None:
+        self.library = library
+        self.controller, self.reference, self.measurement = map(library.new, ("controller", "reference", "measurement"))
+        self.command, self.diagnostics, self.state = map(library.new, ("command", "diagnostics", "state"))
+        config = type(library.default()).from_buffer_copy(library.default())
+        config.fallback = fallback
+        for name, value in parameters.items():
+            setattr(config.parameters, name, value)
+        self.status = library("init", self.controller, config)
+        base = library.new("base")
+        if self.status == "OK":
+            assert library("start", self.controller, self.state) == "OK"
+            assert library("signals", self.controller, 0.0, self.reference, base) == "OK"
+            self.measure()
+
+    def measure(self) -> None:
+        for name in fields(self.measurement):
+            setattr(self.measurement, name, getattr(self.state, name))
+
+    def step(self) -> str:
+        return self.library("step", self.controller, self.reference, self.measurement, self.command, self.diagnostics)
+
+
+def test_sizes_are_what_the_readme_says(export: Folder, library: Callable[[str], Library]) -> None:
+    for name in EXPORTS:
+        folder, _ = export(name)
+        [size] = set(re.findall(r"controller takes (\d+) bytes", (folder / "README.md").read_text()))
+        assert ctypes.sizeof(library(name).new("controller")) == int(size), name
+
+
+@pytest.mark.parametrize("name", ["baked", "single", "all"])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("fallback", [0, 1])
+def test_a_number_that_is_not_finite_gives_the_fallback(
+    name: str, bad: float, fallback: int, library: Callable[[str], Library]
+) -> None:
+    case = Case(library(name), fallback)
+    assert case.step() == "OK"
+    good = values(case.command)
+    assert any(good)
+    expected = good if fallback == 1 else [0.0, 0.0]
+    for structure, status in ((case.reference, "BAD_REFERENCE"), (case.measurement, "BAD_MEASUREMENT")):
+        for field in fields(structure):
+            kept = getattr(structure, field)
+            setattr(structure, field, bad)
+            case.command.U_lift = math.nan
+            assert case.step() == status, field
+            assert values(case.command) == expected
+            assert not any(values(case.diagnostics))
+            setattr(structure, field, kept)
+    assert case.step() == "OK"
+    assert values(case.command) == good
+
+
+def test_null_and_uninitialised(library: Callable[[str], Library]) -> None:
+    lib = library("baked")
+    case = Case(lib, fallback=1)
+    assert case.step() == "OK"
+    good = values(case.command)
+    arguments = [case.controller, case.reference, case.measurement, case.command]
+    for k in range(4):
+        case.command.U_lift = 7.0
+        assert lib("step", *[None if i == k else a for i, a in enumerate(arguments)], None) == "NULL_ARGUMENT"
+        if k in (1, 2):
+            assert values(case.command) == good
+        if k == 0:
+            assert values(case.command) == [0.0, 0.0]
+    assert lib("init", None, lib.default()) == "NULL_ARGUMENT"
+    assert lib("init", case.controller, None) == "NULL_ARGUMENT"
+    assert case.step() == "NOT_INITIALIZED"
+    assert values(case.command) == [0.0, 0.0]
+    assert lib("start", lib.new("controller"), case.state) == "NOT_INITIALIZED"
+    assert Case(lib, fallback=2).status == "BAD_FALLBACK"
+
+
+def test_parameters_are_checked(library: Callable[[str], Library]) -> None:
+    lib = library("all")
+    assert Case(lib).status == "OK"
+    assert Case(lib, control_U_max_lift=math.inf).status == "OK"  # no limit is a limit
+    for name, bad in (
+        ("control_k1", 0.0), ("control_k1", -1.0), ("control_k1", math.nan), ("control_k1", math.inf),
+        ("control_alpha", 1.0), ("control_alpha", 0.0), ("control_nu", 3.0), ("control_nu", 0.0),
+        ("control_beta", 1.0), ("control_U_max_lift", math.nan), ("control_U_max_lift", 0.0),
+        ("mechanism_g", math.nan), ("drive_epsilon", 1.5), ("control_delta", -1e-9),
+    ):  # fmt: skip
+        case = Case(lib, **{name: bad})
+        assert case.status == "BAD_PARAMETER", (name, bad)
+        assert case.step() == "NOT_INITIALIZED"
+        assert values(case.command) == [0.0, 0.0]
+
+
+def test_limits_hold_and_are_flagged(library: Callable[[str], Library]) -> None:
+    case = Case(library("tunable"), control_U_max_lift=100.0, control_U_max_rotation=1e6)
+    assert case.step() == "OK"
+    assert case.command.U_lift == -100.0
+    assert (case.diagnostics.saturated_lift, case.diagnostics.saturated_rotation) == (1, 0)
+    assert case.diagnostics.U_s_lift + case.diagnostics.U_f_lift < -100.0
+    assert case.command.U_rotation == case.diagnostics.U_s_rotation + case.diagnostics.U_f_rotation
+
+
+def test_what_overflows_never_becomes_a_limit(library: Callable[[str], Library]) -> None:
+    """fmin(fmax(NaN, -U), U) is -U: a limiter would hide an overflow, so what stands before it is looked at."""
+    limits = {"control_U_max_lift": 50.0, "control_U_max_rotation": 50.0}
+    case = Case(library("tunable"), **limits)
+    case.measurement.q1_lift = 1e200  # e^3 overflows; sigma is infinite
+    assert case.step() == "OVERFLOW"
+    assert values(case.command) == [0.0, 0.0]
+    case = Case(library("tunable"), control_a_max_lift=math.inf, control_K_f_lift=1e300, **limits)
+    case.measurement.dq1_lift, case.measurement.dq2_lift = 1e10, -1e10
+    assert case.step() == "OVERFLOW"
+    assert values(case.command) == [0.0, 0.0]
+
+
+@given(
+    numbers=st.lists(
+        st.floats(width=32) | st.floats() | st.sampled_from([0.0, -0.0, 1e-300, 1e300]), min_size=12, max_size=12
+    )
+)
+def test_ok_means_finite_and_within_limits(library: Callable[[str], Library], numbers: list[float]) -> None:
+    case = Case(library("tunable"), control_U_max_lift=1e4, control_U_max_rotation=2e3)
+    for k, (structure, field) in enumerate(
+        [(s, field) for s in (case.reference, case.measurement) for field in fields(s)]
+    ):
+        setattr(structure, field, numbers[k])
+    status = case.step()
+    assert abs(case.command.U_lift) <= 1e4
+    assert abs(case.command.U_rotation) <= 2e3
+    if status == "OK":
+        assert all(map(math.isfinite, [*numbers, *values(case.diagnostics)]))
+    else:
+        assert values(case.command) == [0.0, 0.0]
+        assert status in ("BAD_REFERENCE", "BAD_MEASUREMENT", "OVERFLOW")
+
+
+def test_plant_step_refuses_and_keeps_the_state(library: Callable[[str], Library]) -> None:
+    lib = library("baked")
+    case = Case(lib)
+    base = lib.array("base", 3)
+    before = values(case.state)
+    for step in (0.0, -1e-4, math.nan, math.inf):
+        assert lib("plant_step", case.controller, case.state, case.command, None, step) == "BAD_PLANT_INPUT"
+    base[1].theta_1x = math.nan
+    assert lib("plant_step", case.controller, case.state, case.command, base, 1e-4) == "BAD_PLANT_INPUT"
+    case.command.U_lift = math.inf
+    assert lib("plant_step", case.controller, case.state, case.command, None, 1e-4) == "BAD_PLANT_INPUT"
+    case.command.U_lift = 1e308
+    assert lib("plant_step", case.controller, case.state, case.command, None, 1e10) == "DIVERGED"
+    assert lib("plant_step", case.controller, None, case.command, None, 1e-4) == "NULL_ARGUMENT"
+    assert values(case.state) == before
+    case.command.U_lift = 0.0
+    at_rest = type(case.state).from_buffer_copy(case.state)
+    assert lib("plant_step", case.controller, case.state, case.command, None, 1e-4) == "OK"
+    assert lib("plant_step", case.controller, at_rest, case.command, lib.array("base", 3), 1e-4) == "OK"
+    assert values(case.state) == values(at_rest) != before
+
+
+def test_every_status_has_a_sentence(library: Callable[[str], Library]) -> None:
+    lib = library("tunable")
+    texts = [lib.text(status) for status in range(len(STATUS))]
+    assert len(set(texts)) == len(STATUS)
+    assert all(re.fullmatch(r"[a-z][^\n]+", text) for text in texts)
+    assert "arm_init" in texts[2]  # names carry the prefix
+    assert lib.text(-1) == lib.text(999) == "no status of this library"
+
+
+def test_instances_do_not_know_of_each_other(library: Callable[[str], Library]) -> None:
+    lib = library("tunable")
+    alone = Case(lib, control_k1=2.0)
+    assert alone.step() == "OK"
+    one, two = Case(lib, control_k1=2.0), Case(lib, fallback=1, control_k1=4.0)
+    assert (one.step(), two.step(), one.step()) == ("OK", "OK", "OK")
+    assert values(one.command) == values(alone.command) != values(two.command)
+
+
+# --- the simulator's bits ------------------------------------------------------------------------------------
+
+
+def columns(text: str) -> dict[str, np.ndarray]:
+    header, *rows = text.splitlines()
+    table = np.array([[float(number) for number in row.split(",")] for row in rows])
+    return dict(zip(header.split(","), table.T, strict=True))
+
+
+_QUANTITIES = ("q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U")
+
+
+@pytest.mark.parametrize("tunable", ["none", "all"])
+@pytest.mark.parametrize("scenario", ["paper/nominal", "paper/group1_shake", "paper/group3_payload_plus"])
+@pytest.mark.parametrize("engine", ["lanes", "casadi"])
+def test_the_exported_loop_gives_the_simulators_bits(scenario: str, tunable: str, engine: Any, tmp_path: Path) -> None:
+    """main.c: control at 1 kHz, plant steps of 0.1 ms, against the sampled loop with the same rates, bit for bit."""
+    loaded = load_scenario(scenario)
+    structure, numbers = loaded.structure(), loaded.values()
+    write_tree(tmp_path / "c", *generate_files(structure, numbers, tunable=tunable))
+    units = [tmp_path / "c" / "src" / "springline.c", tmp_path / "c" / "main.c"]
+    program = compile_c("cc", units, tmp_path / "main", *FLAGS)
+    printed = columns(run(program, "1"))
+
+    loop = kernel(structure, True, KernelOptions(engine=engine, width=1, groups=1))
+    runs = loop.run(numbers[None], LoopSettings(steps=10_000, step=1e-4, hold=10, output_every=100))
+    rows = runs.trajectory[0].T
+    names = [
+        "t",
+        *(f"{q}_{j}" for q in ("q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U") for j in ("lift", "rotation")),
+    ]
+    simulated = dict(zip(names, rows, strict=False))
+    for name, column in printed.items():
+        assert np.array_equal(column, simulated[name]), name
+
+
+def test_single_precision_against_double(export: Folder, tmp_path: Path) -> None:
+    """A closed loop of one second, control at 1 kHz: docs/embedding.md states these bounds."""
+    trajectories = []
+    for name in ("baked", "single"):
+        folder, prefix = export(name)
+        units = [folder / "src" / f"{prefix}.c", folder / "main.c"]
+        program = compile_c("cc", units, tmp_path / name, *FLAGS)
+        trajectories.append(columns(run(program, "1")))
+    double, single = trajectories
+    error = {name: float(np.abs(single[name] - double[name]).max()) for name in double}
+    assert error["q1_lift"] < 1e-5
+    assert error["q1_rotation"] < 1e-5
+    assert max(error["U_lift"], error["U_rotation"]) < 1.0
+
+
+def test_structures_of_tables_export_without_their_data(tmp_path: Path) -> None:
+    """A base motion from a table is an input of the C; the export's own signals leave it at zero and say so."""
+    loaded = load_scenario("ship/vessel_10hz")
+    write_tree(tmp_path / "c", *generate_files(loaded.structure(), loaded.values()))
+    assert "table is not part of the export" in (tmp_path / "c" / "include" / "springline.h").read_text()
+    units = sources(tmp_path / "c", "springline", "self_check.c")
+    run(compile_c("cc", units, tmp_path / "check", *WARNINGS, "-O1"), tmp_path / "c" / "test_vectors.txt")
+
+
+@pytest.mark.parametrize("law", ["double_power", "power"])
+@pytest.mark.parametrize("form", ["power", "base"])
+def test_every_law_exports(law: str, form: Any, tmp_path: Path) -> None:
+    loaded = load_scenario("paper/nominal")
+    structure = replace(loaded.structure(), law=law if form == "power" else "variable_power_log", log_form=form)
+    write_tree(tmp_path / "c", *generate_files(structure, loaded.values(), tunable=["control.alpha"]))
+    units = sources(tmp_path / "c", "springline", "self_check.c")
+    run(compile_c("cc", units, tmp_path / "check", *WARNINGS, "-O1"), tmp_path / "c" / "test_vectors.txt")

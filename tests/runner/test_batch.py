@@ -1,0 +1,442 @@
+"""Sweeps from file to dataset: the same table however they are run, and what happens when something breaks."""
+
+import importlib.util
+import json
+import os
+import re
+import signal
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+from scipy.stats import spearmanr
+from typer.testing import CliRunner
+
+from springline.codegen.toolchain import ToolchainError
+from springline.runner import batch, load_scenario, simulate
+from springline.runner.batch import Cluster, Threads, dataset_bytes, estimate, open_pool, run_sweep, versions
+from springline.runner.cli import app
+from springline.runner.commands.batch import size_text, time_text
+from springline.runner.dataset import Dataset, place, read_dataset
+from springline.runner.errors import InputError
+from springline.runner.plan import Plan
+from springline.runner.replay import stored_plan
+from springline.runner.summary import QUANTILES, summarize
+from springline.runner.sweep import load_sweep
+from springline.runner.sweep_plots import rank_correlation
+from springline.runner.work import parcel, perform_parcel
+
+# Steps that cost next to nothing; one kernel for most tests of this file and of test_dataset.py.
+SWEEP = """
+scenario = "paper/nominal"
+samples = 300
+seed = 2
+[set]
+simulation.duration = 0.002
+[vary]
+control.delta = { log_uniform = [0.02, 0.1] }
+control.k1 = { uniform = [1.0, 5.0] }
+"""
+
+Command = Callable[..., Any]
+
+
+@pytest.fixture
+def command() -> Command:
+    """The command line, in this process."""
+
+    def call(*words: object) -> Any:
+        return CliRunner().invoke(app, [str(word) for word in words])
+
+    return call
+
+
+@pytest.fixture
+def sweep(tmp_path: Path) -> Path:
+    file = tmp_path / "sweep.toml"
+    file.write_text(SWEEP, encoding="utf-8")
+    return file
+
+
+def run(sweep: Path, destination: Path | str, *, chunk: int = 0, pool: Any = None, resume: bool = False) -> Any:
+    """A sweep without the command line; returns its tally."""
+    plan, dataset = Plan(load_sweep(sweep), chunk), Dataset(place(destination))
+    with dataset.place.locked():
+        plan = dataset.begin(plan, versions(), resume=resume)
+        done = dataset.done(plan)
+        if pool is not None:
+            return run_sweep(plan, dataset, pool, done)
+        with open_pool(1) as threads:
+            return run_sweep(plan, dataset, threads, done)
+
+
+def test_the_table_has_what_it_should(sweep: Path, tmp_path: Path) -> None:
+    tally = run(sweep, tmp_path / "data")
+    assert (tally.done, tally.failed, tally.left) == (300, 0, 0)
+    table = read_dataset(tmp_path / "data")
+    assert table["run"].to_pylist() == list(range(300))
+    assert table.column_names[:3] == ["run", "control.delta", "control.k1"]
+    assert table.column_names[-2:] == ["status", "t_end"]
+    assert set(table["status"].to_pylist()) == {"ok"}
+    assert table.schema.field("iae_lift").metadata[b"unit"] == b"m s"
+    assert table.schema.field("control.delta").metadata[b"unit"] == b"m or rad"
+
+
+def test_tables_do_not_depend_on_jobs_or_chunks(sweep: Path, tmp_path: Path) -> None:
+    tables = []
+    for i, (jobs, chunk) in enumerate(((1, 300), (2, 32), (3, 77))):
+        with open_pool(jobs) as pool:
+            run(sweep, tmp_path / str(i), chunk=chunk, pool=pool)
+        tables.append(read_dataset(tmp_path / str(i)))
+    assert all(table.equals(tables[0], check_metadata=True) for table in tables)
+
+
+def test_a_sweep_a_python_batch_and_single_runs_agree_to_the_last_bit(sweep: Path, tmp_path: Path) -> None:
+    run(sweep, tmp_path / "data")
+    table = read_dataset(tmp_path / "data")
+    scenario = load_scenario("paper/nominal", {"simulation.duration": 0.002})
+    keys = ["control.delta", "control.k1"]
+    again = batch(scenario, {key: table[key].to_numpy() for key in keys}, jobs=2)
+    assert again.equals(table, check_metadata=True)
+    for row in (0, 150, 299):
+        one = simulate(scenario.with_overrides({key: table[key][row].as_py() for key in keys}))
+        assert one.metrics.to_pylist()[0] == {name: table[name][row].as_py() for name in one.metrics.column_names}
+
+
+def test_python_batch_refuses_columns_that_do_not_fit() -> None:
+    scenario = load_scenario("paper/nominal")
+    for columns in ({}, {"control.k1": []}, {"control.k1": [1.0], "control.k2": [1.0, 2.0]}):
+        with pytest.raises(ValueError, match="non-empty arrays of one length"):
+            batch(scenario, columns)
+    with pytest.raises(InputError, match=r"control\.k1"):
+        batch(scenario, {"control.k": [1.0]})
+
+
+def test_groups_differ_in_structure_and_timing(tmp_path: Path) -> None:
+    file = tmp_path / "sweep.toml"
+    vary = "simulation.duration = { each = [0.001, 0.002] }\n"
+    file.write_text(SWEEP.replace("samples = 300", "samples = 40") + vary, encoding="utf-8")
+    run(file, tmp_path / "data")
+    table = read_dataset(tmp_path / "data")
+    assert np.array_equal(table["t_end"].to_numpy(), np.repeat([0.001, 0.002], 40))
+    assert np.array_equal(table["simulation.duration"].to_numpy(), np.repeat([0.001, 0.002], 40))
+    assert np.array_equal(table["control.k1"].to_numpy()[:40], table["control.k1"].to_numpy()[40:])
+
+
+def test_kept_trajectories_are_those_of_the_runs(sweep: Path, tmp_path: Path) -> None:
+    sweep.write_text(SWEEP + "[keep]\ntrajectories = 70\n", encoding="utf-8")
+    run(sweep, tmp_path / "data", chunk=32)
+    dataset = Dataset(place(tmp_path / "data"))
+    names = dataset.place.names("trajectories")
+    assert names == [f"run-{k:09d}.parquet" for k in (0, 70, 140, 210, 280)]
+    scenario = stored_plan(dataset).scenario_of(140)
+    assert dataset.read_part(f"trajectories/{names[2]}").equals(simulate(scenario).trajectory)
+
+
+# --- workers elsewhere -----------------------------------------------------------------------------------
+
+
+def test_a_parcel_is_compiled_from_its_sources_and_checked(sweep: Path) -> None:
+    plan = Plan(load_sweep(sweep))
+    chunk = plan.chunk(0)
+    work, parameters = chunk.group.work, plan.parameters(chunk, plan.columns(chunk))
+    sent = parcel(work)
+    with open_pool(1) as threads:
+        here = threads.submit(work, parameters, [3]).result()
+    there = perform_parcel(sent, parameters, [3])
+    assert np.array_equal(here.runs.final_state, there.runs.final_state)
+    assert np.array_equal(here.runs.metrics, there.runs.metrics, equal_nan=True)
+    assert np.array_equal(here.trajectories[0], there.trajectories[0])
+    files = tuple((name, text.replace("0.5", "0.25")) for name, text in sent.source.files)
+    damaged = replace(sent, source=replace(sent.source, files=files))
+    with pytest.raises(ValueError, match="damaged on the way"):
+        perform_parcel(damaged, parameters)
+
+
+@pytest.fixture
+def distributed() -> Any:
+    if importlib.util.find_spec("distributed") is None:
+        (pytest.fail if os.environ.get("CI") == "true" else pytest.skip)("dask.distributed is not installed")
+    return importlib.import_module("distributed")
+
+
+def test_a_cluster_whose_worker_is_killed_gives_the_same_table(sweep: Path, tmp_path: Path, distributed: Any) -> None:
+    run(sweep, tmp_path / "here", chunk=32)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        victim = next(iter(client.run(os.getpid).values()))
+        pool = _Killing(Cluster(client), after=4, pid=victim)
+        tally = run(sweep, tmp_path / "there", chunk=32, pool=pool)
+        assert pool.killed
+    assert (tally.done, tally.failed) == (300, 0)
+    assert _parts(tmp_path / "here") == _parts(tmp_path / "there")
+
+
+class _Killing:
+    """A pool that kills a process once some chunks have been submitted."""
+
+    def __init__(self, pool: Cluster, after: int, pid: int) -> None:
+        self._pool, self._left, self._pid = pool, after, pid
+        self.killed = False
+        self.threads = 2
+
+    def submit(self, *arguments: Any) -> Future[Any]:
+        self._left -= 1
+        if self._left == 0:
+            os.kill(self._pid, signal.SIGKILL)
+            self.killed = True
+        return self._pool.submit(*arguments)
+
+    def underway(self) -> int:
+        return self._pool.underway()
+
+    def stop(self) -> None:
+        self._pool.stop()
+
+
+def _parts(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.glob("part-*.parquet")}
+
+
+@pytest.mark.parametrize("address", ["local:0", "local:x", "somewhere", "tcp://127.0.0.1:1"])
+def test_a_bad_scheduler_is_the_users_mistake(
+    address: str, distributed: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("springline.runner.batch._ANSWER", "0.5s")
+    with pytest.raises(InputError, match="--scheduler"), open_pool(None, address):
+        pass
+
+
+# --- what breaks -----------------------------------------------------------------------------------------
+
+
+class _Failing:
+    """A pool in which given chunks fail a given number of times; chunk k is the k-th that is submitted."""
+
+    def __init__(self, failures: dict[float, int]) -> None:
+        self._threads = Threads(1)
+        self._failures = failures
+        self.threads = 1
+
+    def submit(self, work: Any, parameters: Any, kept: Any) -> Future[Any]:
+        chunk = float(parameters[0, 0])
+        if self._failures.get(chunk, 0) > 0:
+            self._failures[chunk] -= 1
+            future: Future[Any] = Future()
+            future.set_exception(BrokenProcessPool("a worker died"))
+            return future
+        return self._threads.submit(work, parameters, kept)
+
+    def underway(self) -> int:
+        return 0
+
+    def stop(self) -> None:
+        self._threads.stop()
+
+
+def _failing(sweep: Path, times: dict[int, int]) -> _Failing:
+    plan = Plan(load_sweep(sweep), 32)
+    first = {k: float(plan.parameters(plan.chunk(k), plan.columns(plan.chunk(k)))[0, 0]) for k in times}
+    return _Failing({first[k]: n for k, n in times.items()})
+
+
+def test_a_bad_chunk_is_tried_again_then_reported_and_the_rest_goes_on(sweep: Path, tmp_path: Path) -> None:
+    tally = run(sweep, tmp_path / "a", chunk=32, pool=_failing(sweep, {2: 2, 5: 3}))
+    assert (tally.done, tally.failed) == (268, 32)
+    assert tally.failures == ["runs 160 to 191: BrokenProcessPool: a worker died"]
+    tally = run(sweep, tmp_path / "a", resume=True)
+    assert (tally.found, tally.done, tally.left) == (268, 32, 0)
+    run(sweep, tmp_path / "b", chunk=32)
+    assert _parts(tmp_path / "a") == _parts(tmp_path / "b")
+
+
+def test_three_lost_chunks_in_a_row_end_a_sweep(sweep: Path, tmp_path: Path) -> None:
+    tally = run(sweep, tmp_path / "a", chunk=32, pool=_failing(sweep, dict.fromkeys(range(3, 10), 99)))
+    assert (tally.done, tally.failed, tally.left) == (96, 96, 204)
+
+
+def test_without_a_compiler_a_sweep_fails_at_once(
+    sweep: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep.write_text(SWEEP.replace("control.k1", "control.k2"), encoding="utf-8")  # a kernel nobody compiled
+    monkeypatch.setenv("CC", "no-such-compiler")
+    done = command("batch", sweep, "-o", tmp_path / "data")
+    assert done.exit_code == 1
+    assert "no-such-compiler" in done.stderr
+    with pytest.raises(ToolchainError):
+        run(sweep, tmp_path / "other")
+
+
+def test_ctrl_c_keeps_what_is_done_and_says_how_to_resume(
+    sweep: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "data"
+    sweep.write_text(SWEEP.replace("0.002", "0.05").replace("300", "2000"), encoding="utf-8")
+
+    def interrupt() -> None:
+        while len(list(folder.glob("part-*"))) < 3:
+            time.sleep(0.005)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    watcher = Thread(target=interrupt)
+    watcher.start()
+    done = command("batch", sweep, "-o", folder, "--jobs", 1)
+    watcher.join()
+    assert done.exit_code == 130
+    stored = int(re.search(r"stopped: ([\d,]+) of 2,000 runs are stored", done.stderr)[1].replace(",", ""))
+    assert 96 <= stored < 2000
+    assert f"springline batch {sweep} -o {folder} --resume" in done.stderr.replace("\n", " ")
+    again = command("batch", sweep, "-o", folder, "--resume", "--json")
+    assert again.exit_code == 0
+    assert json.loads(again.stdout)["rows"] == [{"group": "all", "ok": 2000, "diverged": 0, "out_of_bounds": 0}]
+
+
+# --- the commands ----------------------------------------------------------------------------------------
+
+
+def test_batch_writes_a_dataset_with_its_summary(sweep: Path, tmp_path: Path, command: Command) -> None:
+    folder = tmp_path / "data"
+    done = command("batch", sweep, "-o", folder)
+    assert done.exit_code == 0, done.output
+    assert "settling_time_lift" in done.stdout
+    assert {"sweep.json", "summary.md", "map.png", "map.svg", "part-000000.parquet"} <= {
+        f.name for f in folder.iterdir()
+    }
+    text = (folder / "summary.md").read_text(encoding="utf-8")
+    assert "![map](map.png)" in text
+    assert "300 of 300 runs" in text
+    stored = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    assert (stored["runs"], stored["chunk"], len(stored["groups"])) == (300, 32, 1)
+    assert re.fullmatch("[0-9a-f]{64}", stored["groups"][0]["kernel"])
+
+
+def test_replay_is_bit_identical_and_notices_what_is_not(sweep: Path, tmp_path: Path, command: Command) -> None:
+    """Over a grid, whose numbering depends on the order of its axes, here not the alphabetical one."""
+    vary = "control.k1 = { values = [1.0, 2.0, 3.0] }\ncontrol.delta = { log_uniform = [0.02, 0.1], points = 12 }\n"
+    text = SWEEP.split("[vary]", maxsplit=1)[0].replace("samples = 300", 'method = "grid"') + "[vary]\n" + vary
+    sweep.write_text(text, encoding="utf-8")
+    folder = tmp_path / "data"
+    assert command("batch", sweep, "-o", folder).exit_code == 0
+    done = command("replay", folder, 17, "-o", tmp_path / "again", "--no-plot")
+    assert done.exit_code == 0, done.output
+    assert "bit for bit" in done.stdout
+    assert (tmp_path / "again" / "trajectory.parquet").exists()
+
+    part = folder / "part-000000.parquet"
+    table = Dataset(place(folder)).read_part(part.name)
+    column = table["iae_lift"].to_numpy().copy()
+    column[17] = np.nextafter(column[17], 1.0)
+    place_of = table.column_names.index("iae_lift")
+    parquet.write_table(table.set_column(place_of, table.schema.field("iae_lift"), pa.array(column)), part)
+    done = command("replay", folder, 17, "-o", tmp_path / "wrong", "--no-plot")
+    assert done.exit_code == 1
+    assert "iae_lift: 0x" in done.stderr
+    assert command("replay", folder, 36, "-o", tmp_path / "none").exit_code == 2
+    assert command("replay", tmp_path, 0, "-o", tmp_path / "none").exit_code == 2
+
+
+def test_dry_run_writes_nothing_and_its_size_is_about_right(sweep: Path, tmp_path: Path, command: Command) -> None:
+    folder = tmp_path / "data"
+    done = command("batch", sweep, "-o", folder, "--dry-run", "--json")
+    assert done.exit_code == 0, done.output
+    facts = json.loads(done.stdout)["rows"][0]
+    assert (facts["runs"], facts["groups"], facts["chunks"], facts["chunk"]) == (300, 1, 10, 32)
+    assert 0 < facts["seconds"] < 10
+    assert not folder.exists()
+    assert "about" in command("batch", sweep, "-o", folder, "--dry-run").stdout
+    run(sweep, folder)
+    size = sum(file.stat().st_size for file in folder.glob("part-*"))
+    assert size / 3 < facts["bytes"] < 3 * size
+
+
+def test_a_long_sweep_says_so_before_it_starts(
+    sweep: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("springline.runner.commands.batch._LONG", 0.0)
+    done = command("batch", sweep, "-o", tmp_path / "data")
+    assert done.exit_code == 0
+    assert "this will take about" in done.stderr
+
+
+def test_estimate_grows_with_the_sweep(sweep: Path) -> None:
+    small = Plan(load_sweep(sweep))
+    sweep.write_text(SWEEP.replace("300", "30000"), encoding="utf-8")
+    large = Plan(load_sweep(sweep))
+    assert 10 < estimate(large, 1).seconds / estimate(small, 1).seconds < 1000
+    assert 20 < dataset_bytes(large) / dataset_bytes(small) < 110
+    assert estimate(large, 1, left=300).seconds < estimate(large, 1).seconds / 10
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("control.delta", "control.delt"),
+        lambda text: text.replace("[0.02, 0.1]", "[0.1, 0.02]"),
+        lambda text: text.replace("[0.02, 0.1]", "[0.0, 0.1]"),
+        lambda text: text.replace("samples = 300", "samples = 0"),
+        lambda text: text.replace("[vary]", "[vry]"),
+    ],
+)
+def test_bad_input_is_exit_2_and_nothing_is_written(
+    sweep: Path, tmp_path: Path, command: Command, change: Callable[[str], str]
+) -> None:
+    sweep.write_text(change(SWEEP), encoding="utf-8")
+    done = command("batch", sweep, "-o", tmp_path / "data")
+    assert done.exit_code == 2
+    assert "sweep.toml" in done.stderr
+    assert not (tmp_path / "data").exists()
+
+
+def test_summary_numbers_are_those_of_the_table(tmp_path: Path) -> None:
+    """With some runs that leave their bounds: what is worst, what is missing, and the quantiles."""
+    file = tmp_path / "sweep.toml"
+    text = SWEEP.replace("simulation.duration = 0.002", "simulation.duration = 0.01\nsimulation.bound = 40.0")
+    file.write_text(text.replace("control.k1 = { uniform = [1.0, 5.0] }", "initial.dq.0 = { uniform = [0, 60] }"))
+    run(file, tmp_path / "data", chunk=64)
+    dataset = Dataset(place(tmp_path / "data"))
+    plan = stored_plan(dataset)
+    found, table = summarize(plan, dataset), read_dataset(tmp_path / "data")
+    status = np.array(table["status"].to_pylist())
+    stopped = int((status != "ok").sum())
+    assert 0 < stopped < 300
+    assert found.stopped == stopped == found.outcomes["all"]["out_of_bounds"]
+    values = table["U_max_lift"].to_numpy()
+    median = np.quantile(values, 0.5, method="nearest")
+    assert found.metrics["U_max_lift"].quantiles[QUANTILES.index(0.5)] == pytest.approx(median, rel=0.02)
+    assert found.metrics["U_max_lift"].quantiles[-1] == values.max()
+    missing = np.isnan(table["steady_state_error_lift"].cast(pa.float64()).to_numpy()).mean()
+    assert found.metrics["steady_state_error_lift"].missing == pytest.approx(missing)
+    first = np.sort(table["t_end"].to_numpy()[status != "ok"])[: len(found.worst)]
+    assert [row["t_end"] for row in found.worst][: len(first)] == list(first)
+
+
+def test_rank_correlation_is_spearmans_within_groups() -> None:
+    rng = np.random.default_rng(0)
+    x, noise = rng.normal(size=(2, 500))
+    group = np.zeros(500, dtype=np.int64)
+    assert rank_correlation(x, np.exp(x) + noise, group) == pytest.approx(spearmanr(x, np.exp(x) + noise).statistic)
+    shifted = np.repeat([0.0, 1000.0], 250)
+    assert rank_correlation(x + shifted, x - shifted, np.repeat([0, 1], 250)) == pytest.approx(1.0)
+    assert np.isnan(rank_correlation(x, np.ones(500), group))
+
+
+def test_sizes_and_times_are_for_people() -> None:
+    assert [time_text(s) for s in (0.123, 40, 600, 20_000, 400_000)] == [
+        "0.12 s",
+        "40 s",
+        "10 min",
+        "5.6 h",
+        "4.6 days",
+    ]
+    assert [size_text(b) for b in (12, 34_567, 5.6e9, 7e13)] == ["12 B", "34.6 kB", "5.6 GB", "70 TB"]

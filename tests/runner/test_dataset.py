@@ -1,0 +1,340 @@
+"""Datasets survive: kills at any moment, two writers at once, a full disk, and what somebody else did to the folder."""
+
+import errno
+import json
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from multiprocessing.context import ForkServerContext
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from springline.runner.batch import open_pool, run_sweep, versions
+from springline.runner.commands.batch import batch
+from springline.runner.dataset import Dataset, changes, place, read_dataset
+from springline.runner.errors import InputError
+from springline.runner.plan import Plan
+from springline.runner.storage import TEMPORARY
+from springline.runner.sweep import load_sweep
+
+SWEEP = """
+scenario = "paper/nominal"
+samples = {samples}
+seed = 2
+chunk = {chunk}
+[set]
+simulation.duration = 0.002
+[vary]
+control.delta = {{ log_uniform = [0.02, 0.1] }}
+control.k1 = {{ uniform = [1.0, 5.0] }}
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    def make(samples: int = 300, chunk: int = 32, change: tuple[str, str] = ("", "")) -> Path:
+        file = tmp_path / "sweep.toml"
+        file.write_text(SWEEP.format(samples=samples, chunk=chunk).replace(*change), encoding="utf-8")
+        return file
+
+    return make
+
+
+def run(sweep: Path, destination: Path | str, *, resume: bool = False) -> Any:
+    """A sweep without the command line; returns its tally."""
+    plan, dataset = Plan(load_sweep(sweep)), Dataset(place(destination))
+    with dataset.place.locked(), open_pool(1) as pool:
+        plan = dataset.begin(plan, versions(), resume=resume)
+        return run_sweep(plan, dataset, pool, dataset.done(plan))
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    """The dataset's own files; summaries and the lock are none."""
+    return {f.name: f.read_bytes() for f in folder.iterdir() if f.name.startswith(("part-", "sweep.json", TEMPORARY))}
+
+
+# --- resuming --------------------------------------------------------------------------------------------
+
+
+def test_resume_does_exactly_what_is_missing(write: Callable[..., Path], tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    run(write(), folder)
+    whole = content(folder)
+    (folder / "part-000003.parquet").unlink()
+    half = whole["part-000005.parquet"][:-100]
+    (folder / "part-000005.parquet").write_bytes(half)
+    (folder / f"{TEMPORARY}leftover").write_bytes(b"of a process that was killed")
+    untouched = (folder / "part-000004.parquet").stat().st_mtime_ns
+    tally = run(write(), folder, resume=True)
+    assert (tally.found, tally.done) == (300 - 64, 64)
+    assert content(folder) == whole
+    assert (folder / "part-000004.parquet").stat().st_mtime_ns == untouched
+    assert run(write(), folder, resume=True).done == 0
+
+
+def test_resume_of_nothing_begins(write: Callable[..., Path], tmp_path: Path) -> None:
+    assert run(write(), tmp_path / "data", resume=True).done == 300
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("seed = 2", "seed = 3"), "sweep.seed: 2 -> 3"),
+        (("[1.0, 5.0]", "[1.0, 6.0]"), r"control\.k1\.axis: .*5\.0.* -> .*6\.0"),
+        (("control.k1 =", "control.k2 ="), r"control\.k1.*-> nothing"),
+        (("0.002\n", "0.003\n"), r"scenario\.simulation\.duration: 0\.002 -> 0\.003"),
+        (("samples = 300", "samples = 299"), "runs: 300 -> 299"),
+        (("chunk = 32", "chunk = 64"), "chunk: 32 -> 64"),
+    ],
+)
+def test_resume_refuses_another_sweep_and_says_what_changed(
+    write: Callable[..., Path], tmp_path: Path, change: tuple[str, str], said: str
+) -> None:
+    run(write(), tmp_path / "data")
+    before = content(tmp_path / "data")
+    with pytest.raises(InputError, match=said):
+        run(write(change=change), tmp_path / "data", resume=True)
+    assert content(tmp_path / "data") == before
+
+
+def test_resume_refuses_another_kernel_but_not_another_version(write: Callable[..., Path], tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    run(write(), folder)
+    file = folder / "sweep.json"
+    stored = json.loads(file.read_text(encoding="utf-8"))
+    file.write_text(json.dumps(stored | {"springline": "0.0.1", "versions": {"numpy": "0"}}), encoding="utf-8")
+    assert run(write(), folder, resume=True).done == 0
+    stored["groups"][0]["kernel"] = "0" * 64
+    file.write_text(json.dumps(stored), encoding="utf-8")
+    with pytest.raises(InputError, match=r"groups\.0\.kernel: '000"):
+        run(write(), folder, resume=True)
+
+
+def test_a_chosen_chunk_size_stays_when_resuming(write: Callable[..., Path], tmp_path: Path) -> None:
+    """A version that would choose another size for the same sweep still resumes it."""
+    folder = tmp_path / "data"
+    free = ("chunk = 32\n", "")
+    plan = Plan(load_sweep(write(change=free)), 96)
+    dataset = Dataset(place(folder))
+    dataset.begin(plan, versions(), resume=False)
+    assert run(write(change=free), folder, resume=True).done == 300
+    assert len(dataset.parts()) == 4
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_folder_with_something_else_is_left_alone(
+    write: Callable[..., Path], tmp_path: Path, *, resume: bool
+) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    (folder / "thesis.tex").write_text("years of work", encoding="utf-8")
+    with pytest.raises(InputError, match=r"not empty and holds no dataset.*thesis\.tex"):
+        batch(str(write()), output=str(folder), resume=resume)
+    assert [file.name for file in folder.iterdir()] == ["thesis.tex"]
+
+
+def test_a_begun_dataset_is_only_continued_on_request(write: Callable[..., Path], tmp_path: Path) -> None:
+    run(write(), tmp_path / "data")
+    with pytest.raises(InputError, match="--resume continues it"):
+        batch(str(write()), output=str(tmp_path / "data"))
+
+
+def test_a_file_in_place_of_the_folder_is_named(write: Callable[..., Path], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is a file"):
+        batch(str(write()), output=str(tmp_path / "sweep.toml"))
+
+
+def test_changes_are_told_by_place() -> None:
+    old = {"a": 1, "l": [{"key": "x", "v": 1}, {"key": "y", "v": 2}], "gone": True}
+    new = {"a": 2, "l": [{"key": "y", "v": 2}, {"key": "x", "v": 3}], "new": [1]}
+    assert set(changes(old, new)) == {
+        "a: 1 -> 2",
+        "l.x.v: 1 -> 3",
+        "l, order: ['x', 'y'] -> ['y', 'x']",
+        "gone: True -> nothing",
+        "new: nothing -> [1]",
+    }
+
+
+# --- URLs ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def memory() -> Iterator[str]:
+    fsspec = pytest.importorskip("fsspec", reason="fsspec is not installed (extra: distributed)")
+    yield "memory://bucket/data"
+    fsspec.filesystem("memory").store.clear()
+
+
+def test_a_url_holds_the_same_dataset(write: Callable[..., Path], tmp_path: Path, memory: str) -> None:
+    run(write(), tmp_path / "data")
+    assert run(write(), memory).done == 300
+    assert read_dataset(memory).equals(read_dataset(tmp_path / "data"), check_metadata=True)
+    assert Dataset(place(memory)).place.read("part-000001.parquet") == content(tmp_path / "data")["part-000001.parquet"]
+    Dataset(place(memory)).place.remove("part-000001.parquet")
+    assert run(write(), memory, resume=True).done == 32
+    assert ".lock" not in place(memory).names()
+
+
+def test_a_url_is_locked_by_the_living_only(write: Callable[..., Path], memory: str) -> None:
+    run(write(), memory)
+    where = place(memory)
+    with where.locked(), pytest.raises(InputError, match="is being written by process"):
+        run(write(), memory, resume=True)
+    host = os.uname().nodename
+    child = subprocess.Popen([sys.executable, "-c", ""])
+    child.wait()
+    where.write(".lock", f"process {child.pid} on {host}".encode())
+    assert run(write(), memory, resume=True).done == 0
+    where.write(".lock", b"process 1 on another-host")
+    with pytest.raises(InputError, match=r"if that process is gone, remove memory://bucket/data/\.lock"):
+        run(write(), memory, resume=True)
+
+
+def test_an_unknown_kind_of_url_is_the_users_mistake(memory: str) -> None:
+    with pytest.raises(InputError, match="nonsense://x"):
+        place("nonsense://x")
+
+
+# --- disasters -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def processes() -> ForkServerContext:
+    """Processes that start with everything imported, so that a kill strikes work and not imports."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["springline.runner.commands.batch", "springline.runner.batch"])
+    return context
+
+
+def start(processes: ForkServerContext, sweep: Path, folder: Path) -> Any:
+    arguments = {"output": str(folder), "jobs": 2, "resume": True}
+    process = processes.Process(target=batch, args=(str(sweep),), kwargs=arguments)
+    process.start()
+    return process
+
+
+def killed_again_and_again(processes: ForkServerContext, sweep: Path, folder: Path, kills: int, parts: int) -> int:
+    """SIGKILL at random moments between the first part and the last; how often it struck a sweep that was at work."""
+    moments = random.Random(7)
+    struck = 0
+    for _ in range(kills):
+        process = start(processes, sweep, folder)
+        target = min(len(list(folder.glob("part-*"))) + moments.randrange(1, max(2, parts // kills)), parts - 1)
+        while process.is_alive() and len(list(folder.glob("part-*"))) < target:
+            time.sleep(0.001)
+        time.sleep(0.02 * moments.random())
+        struck += process.is_alive()
+        os.kill(process.pid, signal.SIGKILL)
+        process.join()
+    return struck
+
+
+def killed_like_undisturbed(
+    write: Callable[..., Path], tmp_path: Path, processes: ForkServerContext, samples: int, chunk: int, kills: int
+) -> None:
+    sweep, folder = write(samples, chunk), tmp_path / "killed"
+    parts = -(-samples // chunk)
+    assert killed_again_and_again(processes, sweep, folder, kills, parts) >= kills // 2
+    before = content(folder)
+    assert len(before) < parts + 1
+    tally = run(sweep, folder, resume=True)
+    assert tally.found + tally.done == samples
+    run(sweep, tmp_path / "undisturbed")
+    assert content(folder) == content(tmp_path / "undisturbed")
+    # What was there after the last kill was whole: nothing of it has been done again.
+    assert tally.found == sum(min(chunk, samples - chunk * int(name[5:11])) for name in before if name[:5] == "part-")
+
+
+def test_kills_lose_nothing(write: Callable[..., Path], tmp_path: Path, processes: ForkServerContext) -> None:
+    killed_like_undisturbed(write, tmp_path, processes, samples=8_192, chunk=64, kills=4)
+
+
+@pytest.mark.full
+def test_twenty_kills_of_50000_runs_lose_nothing(
+    write: Callable[..., Path], tmp_path: Path, processes: ForkServerContext
+) -> None:
+    killed_like_undisturbed(write, tmp_path, processes, samples=50_000, chunk=64, kills=20)
+
+
+def test_of_two_processes_that_resume_at_once_one_refuses(
+    write: Callable[..., Path], tmp_path: Path, processes: ForkServerContext
+) -> None:
+    sweep, folder = write(20_000, 64), tmp_path / "data"
+    process = start(processes, sweep, folder)
+    while not list(folder.glob("part-*")):
+        time.sleep(0.002)
+    with pytest.raises(InputError, match=f"is being written by process {process.pid} on"):
+        run(sweep, folder, resume=True)
+    os.kill(process.pid, signal.SIGKILL)  # the system drops the lock with the process
+    process.join()
+    tally = run(sweep, folder, resume=True)
+    assert tally.left == 0
+
+
+def test_a_full_disk_is_told_and_what_is_there_stays_sound(
+    write: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a disk that has room for three parts; the real thing is the next test."""
+    monkeypatch.setattr("springline.runner.batch._PAUSE", 0.0)
+    from springline.runner import storage
+
+    genuine, room = storage._write_through, [3]
+
+    def full(path: Path, data: bytes) -> None:
+        if room[0] == 0 and path.name.startswith(TEMPORARY):
+            path.write_bytes(data[: len(data) // 2])
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        room[0] -= data[:4] == b"PAR1"
+        genuine(path, data)
+
+    monkeypatch.setattr(storage, "_write_through", full)
+    tally = run(write(), tmp_path / "data")
+    assert (tally.done, tally.failed) == (96, 96)
+    assert "No space left on device" in tally.failures[0]
+    assert sorted(content(tmp_path / "data")) == [*(f"part-{k:06d}.parquet" for k in range(3)), "sweep.json"]
+    monkeypatch.setattr(storage, "_write_through", genuine)
+    assert run(write(), tmp_path / "data", resume=True).done == 204
+    run(write(), tmp_path / "other")
+    assert content(tmp_path / "data") == content(tmp_path / "other")
+
+
+SMALL_DISK = """
+import subprocess, sys
+from typer.testing import CliRunner
+from springline.runner.cli import app
+sweep, disk = sys.argv[1:]
+def call(*more):
+    done = CliRunner().invoke(app, ["batch", sweep, "-o", disk + "/data", *more])
+    print(done.exit_code, done.stderr.replace(chr(10), " "))
+subprocess.run(["mount", "-t", "tmpfs", "-o", "size=120k", "tmpfs", disk], check=True)
+call()
+subprocess.run(["mount", "-o", "remount,size=20m", disk], check=True)
+call("--resume")
+subprocess.run(["cp", "-r", disk + "/data", disk + "-copy"], check=True)
+"""
+
+
+def test_a_tmpfs_that_is_full(write: Callable[..., Path], tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    namespace = [require_tool("unshare"), "--user", "--map-root-user", "--mount"]
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run([*namespace, "mount", "-t", "tmpfs", "tmpfs", disk], capture_output=True).returncode:
+        pytest.skip("this system lets users mount no tmpfs of their own")
+    sweep = write()
+    done = subprocess.run([*namespace, sys.executable, "-c", SMALL_DISK, sweep, disk], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.splitlines()
+    assert first.startswith("1 ")
+    assert "No space left on device" in first
+    assert "--resume" in first
+    assert second.startswith("0 ")
+    run(sweep, tmp_path / "other")
+    assert content(tmp_path / "disk-copy") == content(tmp_path / "other")

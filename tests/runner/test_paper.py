@@ -1,0 +1,354 @@
+"""The reproduction: what was seen before comes out again, and the folder it writes is complete and always the same.
+
+Numbers "seen" come from an independent simulation of the same equations, with RK4 at a step of 2e-5 s.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Mapping
+from hashlib import sha256
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springline.codegen.manifest import FolderConflict
+from springline.runner.measured import Measured
+from springline.runner.paper import Reproduction, reproduce
+from springline.runner.paper_cases import CASES, GROUPS, JOINTS, MEASURES, cases
+from springline.runner.paper_figures import FIGURES, OPEN_FIGURES
+from springline.runner.paper_report import change, number, plain
+from springline.runner.paper_runs import E8_SHAKE, measure, reaching_law, theory_of
+from springline.runner.scenario import load_scenario, packaged_scenarios
+from springline.runner.simulate import simulate
+
+
+def seen(**overrides: Any) -> Measured:
+    """A run of paper/nominal with some keys changed ("__" for a dot)."""
+    scenario = load_scenario("paper/nominal", {key.replace("__", "."): value for key, value in overrides.items()})
+    return measure(scenario, simulate(scenario))
+
+
+def shaken(amplitude: float, omega: float, **control: Any) -> Measured:
+    # A second, empty term: all of these share the kernels of the packaged scenarios.
+    terms = [{"amplitude": amplitude, "omega": omega}, {"amplitude": 0.0, "omega": 0.0}]
+    return seen(base_motion__kind="sine", base_motion__shake=terms, **control)
+
+
+def pair(run: Measured, metric: str) -> tuple[float, float]:
+    lift, rotation = (run.metric(metric, joint) for joint in JOINTS)
+    return lift, rotation
+
+
+# What was seen before
+
+
+@pytest.mark.parametrize(
+    ("law", "response", "settling"),
+    [
+        ("variable_power_log", (0.19, 0.18), (0.215, 0.205)),
+        ("double_power", (0.22, 0.22), (0.255, 0.26)),
+        ("power", (1.04, 0.95), (1.18, 1.11)),
+    ],
+)
+def test_times_of_the_three_laws(law: str, response: tuple[float, float], settling: tuple[float, float]) -> None:
+    run = seen(control__law=law)
+    assert pair(run, "response_time") == pytest.approx(response, rel=0.03)
+    assert pair(run, "settling_time") == pytest.approx(settling, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("changed", "settling"),
+    [
+        ({"control__delta": 0.03}, (0.21, 0.20)),
+        ({"control__delta": 0.06}, (0.22, 0.21)),
+        ({"control__delta": 0.06, "control__a_max": float("inf"), "control__U_max": [2e4, 5e3]}, (0.21, 0.20)),
+    ],
+)
+def test_times_with_other_limits(changed: Mapping[str, Any], settling: tuple[float, float]) -> None:
+    assert pair(seen(**changed), "settling_time") == pytest.approx(settling, abs=0.0075)
+
+
+def test_a_boundary_layer_of_002_chatters_and_one_of_003_does_not() -> None:
+    chattering = seen(control__delta=0.02)
+    assert 0.01 < chattering.metric("steady_state_error", "lift") < 0.03
+    assert chattering.variation_rate("sigma_lift", 1.0) > 1000
+    clean = seen(control__delta=0.03)
+    assert clean.metric("steady_state_error", "lift") < 1e-5
+    assert clean.variation_rate("sigma_lift", 1.0) < 1
+
+
+def test_the_literal_surface_does_not_settle() -> None:
+    """delta = 0 with a_max = 200: a chatter of 0.07-0.6 m, or overflow, at any step."""
+    for step in (1e-4, 5e-5):
+        run = seen(control__delta=0.0, simulation__step=step)
+        assert run.status != "ok" or 0.05 < run.metric("steady_state_error", "lift") < 0.8
+
+
+def test_without_limits_the_run_leaves_its_bound_at_once() -> None:
+    scenario = load_scenario("paper/as_printed")
+    result = simulate(scenario)
+    assert result.status == "out_of_bounds"
+    assert "dq2_lift" in result.message
+    assert measure(scenario, result).end < 0.01
+
+
+def test_a_larger_limit_on_the_law_does_not_settle() -> None:
+    run = seen(control__delta=0.06, control__a_max=1500.0)
+    assert run.status != "ok" or max(pair(run, "steady_state_error")) > 0.05
+    pushed = seen(control__delta=0.06, control__U_max=[5e4, 1.25e4], control__a_max=float("inf"))
+    assert pushed.status != "ok" or max(pair(pushed, "steady_state_error")) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "omega", "errors"), [(0.1, 10.0, (0.006, 0.025, 0.027)), (1.5, 1.5, (0.002, 0.020, 0.025))]
+)
+def test_errors_of_the_lift_under_shake(amplitude: float, omega: float, errors: tuple[float, ...]) -> None:
+    laws = ("variable_power_log", "double_power", "power")
+    found = [shaken(amplitude, omega, control__law=law).metric("steady_state_error", "lift") for law in laws]
+    # The boundary layer of the numbers seen is 0.06 instead of 0.05.
+    assert found == pytest.approx(errors, rel=0.15)
+    assert found == sorted(found)
+
+
+def test_the_two_readings_of_the_logarithms() -> None:
+    """Total variation of sigma per second after 1 s: 1.2 read as powers, 625 read as bases (a limit cycle)."""
+    shake = {key.replace(".", "__"): value for key, value in E8_SHAKE.items()}
+    power, base = (
+        seen(**shake, control__log_form=form, simulation__output_every=2)  # the limit cycle takes 3 ms
+        for form in ("power", "base")
+    )
+    assert power.variation_rate("sigma_lift", 1.0) == pytest.approx(1.2, abs=0.05)
+    assert base.variation_rate("sigma_lift", 1.0) == pytest.approx(625, rel=0.02)
+    assert power.largest("e_lift", 0.25) == pytest.approx(0.005, abs=0.0005)
+    assert base.largest("e_lift", 0.25) == pytest.approx(0.006, abs=0.0005)
+
+
+@pytest.mark.parametrize("a_max", [100.0, 200.0, 1000.0])
+def test_without_fast_control_a_run_diverges(a_max: float) -> None:
+    run = seen(control__fast=False, control__a_max=a_max)
+    assert run.status != "ok"
+    assert 0.15 < run.end < 0.55
+
+
+def test_accelerations_that_the_laws_ask_for_at_the_start() -> None:
+    """E4: 3.5e6 m/s^2 and 7e4 rad/s^2 of the new law, 1.3e5 m/s^2 of the double power law."""
+    new = reaching_law(load_scenario("paper/nominal"))
+    assert np.abs(new(np.array([-7.64, 6.16]))) == pytest.approx([3.5e6, 7e4], rel=0.05)
+    double = reaching_law(load_scenario("paper/nominal", {"control.law": "double_power"}))
+    assert abs(double(np.array([-7.64]))[0]) == pytest.approx(1.3e5, rel=0.01)
+
+
+def test_disturbances_that_the_printed_errors_would_take() -> None:
+    """The reasons of claim 4: sigma at rest with the printed errors, and what the laws ask for there."""
+    for law, error, disturbance in (("double_power", 0.18, 1000.0), ("power", 0.16, 5.0)):
+        scenario = load_scenario("paper/nominal", {"control.law": law, "control.delta": 0.0})
+        x = np.array([-error, 0.0, 0.0, 0.0, -error, 0.0, 0.0, 0.0])
+        rest = np.zeros(2)
+        _, _, sigma = scenario.system().function("slow_control")(rest, rest, rest, x, scenario.values())
+        assert abs(reaching_law(scenario)(np.array([float(sigma[0])]))[0]) == pytest.approx(disturbance, rel=0.02)
+
+
+# Theory
+
+
+def test_the_theory_is_measured_along_the_run() -> None:
+    scenario = load_scenario("paper/group1_roll")
+    run = measure(scenario, simulate(scenario))
+    found = theory_of(scenario, run)
+    assert found.bounds.sliding == pytest.approx([0.342, 0.400], abs=5e-4)
+    assert found.margin.c1 == pytest.approx(3 - found.margin.bound)
+    assert 0 < found.margin.bound < 1
+    assert found.tail == pytest.approx(36.8, abs=0.1)
+    # The law asks for the disturbance at the edge of the residual set.
+    edge = np.abs(reaching_law(scenario)(np.array(found.residual)))
+    assert edge == pytest.approx(found.margin.per_joint, rel=1e-6)
+
+
+def test_velocity_errors_are_those_of_the_reference() -> None:
+    run = seen(simulation__duration=0.5)
+    assert run["dq1d_lift"] == pytest.approx(np.pi * np.cos(np.pi * run["t"]))
+    assert run["velocity_error_rotation"] == pytest.approx(run["dq1d_rotation"] - run["dq1_rotation"])
+
+
+# The paper's tables
+
+
+def test_table_4_is_complete() -> None:
+    assert [sum(case.group == group for case in CASES) for group in GROUPS] == [3, 3, 3, 2]
+    assert {case.scenario for case in CASES} <= set(packaged_scenarios())
+    assert [case.name for case in CASES if not case.printed] == ["fast control off"]
+    for case in CASES:
+        assert not case.printed or list(case.printed) == list(MEASURES)
+    printed = {case.name: case.printed for case in CASES}
+    assert printed["power"]["settling_time"] == (0.76, 1.32)
+    assert printed["pitch"]["steady_state_error"] == (0.003, 0.003)
+    assert [case.printed["response_time"][0] for case in CASES[:4]] == [0.01, 0.01, 0.01, 0.10]
+
+
+def test_a_group_that_the_paper_does_not_have_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="groups 1, 2, 3, 4, not 5"):
+        cases([1, 5])
+    with pytest.raises(ValueError, match="not 0"):
+        reproduce(tmp_path / "out", [0])
+    assert not (tmp_path / "out").exists()
+
+
+def test_every_figure_of_the_paper_is_there_once() -> None:
+    numbered = [int(figure.name.removeprefix("figure_")) for figure in FIGURES]
+    assert numbered == [4, 5, *range(6, 26)]
+    for figure in FIGURES:
+        assert figure.caption.startswith(f"**Figure {int(figure.name[-2:])}.**")
+    assert len({figure.name for figure in (*FIGURES, *OPEN_FIGURES)}) == len(FIGURES) + len(OPEN_FIGURES)
+    assert [f.group for f in FIGURES if f.group] == [1] * 5 + [2] * 4 + [3] * 6 + [4] * 4
+
+
+# The folder
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Reproduction:
+    shares: list[float] = []
+    result = reproduce(tmp_path_factory.mktemp("paper") / "out", [4], progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    return result
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_group_alone_gives_its_rows_figures_and_claims(done: Reproduction) -> None:
+    figures = {f"figures/figure_{number}.{form}" for number in range(22, 26) for form in ("png", "svg")}
+    assert set(contents(done.folder)) == figures | {"report.md", "report.html", "numbers.json", "manifest.json"}
+    assert [finding.number for finding in done.findings] == [8]
+    assert len(done.table) == 2 * 2 * 4  # cases, joints, measures
+    numbers = json.loads((done.folder / "numbers.json").read_bytes())
+    assert numbers["table_4"] == list(done.table)
+    assert numbers["claims"][0]["verdict"] == done.findings[0].verdict
+    off = [row for row in done.table if row["case"] == "fast control off"]
+    assert {row["printed"] for row in off} == {None}
+    assert all(row["value"] is None for row in off if row["measure"] == "settling_time")
+
+
+def test_every_number_has_its_change_at_half_the_step(done: Reproduction) -> None:
+    assert all(number.halved is not None for finding in done.findings for number in finding.numbers)
+    assert all(row["change"] is not None for row in done.table if row["value"] is not None)
+    settling = [row for row in done.table if row["case"] == "fast control on" and row["measure"] == "settling_time"]
+    assert all(abs(row["change"]) <= 1e-4 for row in settling)
+
+
+def test_another_process_replaces_it_with_the_same_bytes(done: Reproduction, tmp_path: Path) -> None:
+    """Half of an earlier reproduction and a file of the user's are there already."""
+    before = contents(done.folder)
+    stale = {"report.md": b"old", "figures/figure_99.png": b"from an older springline"}
+    kept = {name: content for name, content in before.items() if name.endswith((".json", ".svg"))}
+    listed = [{"path": name, "sha256": sha256(content).hexdigest()} for name, content in (kept | stale).items()]
+    manifest = json.loads(before["manifest.json"]) | {"files": listed}
+    there = kept | stale | {"manifest.json": json.dumps(manifest).encode(), "notes.txt": b"mine"}
+    for name, content in there.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    program = "import sys, pathlib, springline.runner.paper as p; p.reproduce(pathlib.Path(sys.argv[1]), [4])"
+    environment = os.environ | {"PYTHONHASHSEED": "7", "TZ": "Asia/Tokyo"}
+    subprocess.run([sys.executable, "-c", program, tmp_path], check=True, env=environment)
+    assert contents(tmp_path) == before | {"notes.txt": b"mine"}
+
+
+def test_a_folder_of_another_command_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "model.c").write_text("int x;")
+    (tmp_path / "manifest.json").write_text(json.dumps({"files": [{"path": "model.c", "sha256": "0"}]}))
+    before = contents(tmp_path)
+    with pytest.raises(FolderConflict, match="another command"):
+        reproduce(tmp_path, [4])
+    assert contents(tmp_path) == before
+
+
+class Page(HTMLParser):
+    """What a browser would fetch, and whether every element is closed."""
+
+    VOID = ("meta", "img")
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.sources: list[str] = []
+        self.targets: list[str] = []
+        self.anchors: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        self.sources += [value for key, value in attrs if key == "src" and value]
+        self.targets += [value for key, value in attrs if key == "href" and value]
+        self.anchors += [given["id"]] if given.get("id") else []
+        assert tag not in ("script", "link", "iframe")
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_the_html_report_needs_nothing_else(done: Reproduction) -> None:
+    text = done.report.read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.open == []
+    assert len(page.sources) == 4
+    for source in page.sources:
+        head, _, data = source.partition(",")
+        assert head == "data:image/svg+xml;base64"
+        assert base64.b64decode(data).lstrip().startswith(b"<?xml")
+    assert all(target.removeprefix("#") in page.anchors for target in page.targets)
+    assert len(page.anchors) == len(set(page.anchors))
+    assert "url(" not in text
+    assert "prefers-color-scheme: dark" in text
+
+
+def test_the_markdown_report_shows_files_that_are_there(done: Reproduction) -> None:
+    text = (done.folder / "report.md").read_text(encoding="utf-8")
+    linked = re.findall(r"\]\(([^)]+)\)", text)
+    assert len(linked) == 8
+    assert all((done.folder / path).is_file() for path in linked)
+    rows = [line for line in text.splitlines() if line.startswith("| ")]
+    assert not any("[[" in row for row in rows)
+    assert "diverge" in text or "left its bound" in text
+
+
+# Numbers for people
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.20456, "0.205"),
+        (-0.0015, "−0.0015"),
+        (0.0, "0"),
+        (5e-5, "5.00·10⁻⁵"),
+        (3.5e6, "3.50·10⁶"),
+        (12345.6, "12346"),
+        (float("nan"), "–"),
+        (float("inf"), "∞"),
+        (None, "–"),
+    ],
+)
+def test_numbers_are_written_for_people(value: float | None, text: str) -> None:
+    assert number(value) == text
+
+
+def test_changes_have_a_sign_and_rounding_is_none() -> None:
+    assert change(5e-5, 0.2) == "+5.0·10⁻⁵"
+    assert change(-0.25, 20.0) == "−0.25"
+    assert change(1e-12, 0.2) == "0"
+    assert change(float("nan"), float("nan")) == "–"
+    assert plain(float("nan")) is None
+    assert plain(float("inf")) == "inf"

@@ -1,0 +1,141 @@
+"""The benchmark measures what it says: every contender does the same work, and the table tells of one that does not."""
+
+import json
+import math
+import platform
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springline.benchmarks import harness, problem, roofline
+from springline.benchmarks.compile_time import compile_times
+from springline.benchmarks.contenders import CONTENDERS, handwritten_c, ours
+from springline.runner import bench
+from springline.runner.commands import bench as command
+
+TINY = harness.Effort(
+    rounds=1, sample=1e-3, adaptive=problem.QUANTUM, compared=problem.QUANTUM, comparison=1e-3, compilers=False
+)
+
+# One of each build; of springline's own those that are not covered by the tests of equal bits.
+AGREEING = {
+    repr(contender.build): contender
+    for contender in CONTENDERS
+    if "W =" not in contender.variant and "all tunable" not in contender.variant
+}
+
+
+def default(mode: problem.Control) -> problem.Contender:
+    return next(contender for contender in CONTENDERS if ours.is_default(contender) and contender.control == mode)
+
+
+@pytest.mark.parametrize("contender", AGREEING.values(), ids=lambda contender: contender.title)
+def test_a_contender_does_the_same_work(contender: problem.Contender) -> None:
+    for module in contender.modules:
+        pytest.importorskip(module, reason=f"{module} is not installed: pip install 'springline[bench]'")
+    delta = np.array([0.04, 0.05, 0.06])
+    final = contender.build()(delta, problem.QUANTUM)
+    expected = ours.reference(contender.control)(delta, problem.QUANTUM)
+    assert final.shape == (3, 8)
+    assert np.all(np.abs(final - expected) <= contender.tolerance * np.maximum(1.0, np.abs(expected)))
+    # The three runs differ by far more than the tolerance, so one that ignored delta would be noticed.
+    assert np.max(np.abs(expected[0] - expected[2])) > 2e-2
+
+
+def test_contenders_are_told_apart() -> None:
+    assert sum(map(ours.is_default, CONTENDERS)) == len(problem.MODES)
+    titles = [contender.title for contender in CONTENDERS]
+    assert len(titles) == len(set(titles))
+    assert all(contender.variant.partition(",")[0] == contender.control for contender in CONTENDERS)
+
+
+def test_ratios_refer_to_springlines_default_of_the_same_mode() -> None:
+    chosen = [default(mode) for mode in problem.MODES] + [handwritten_c.CONTENDERS[0]]
+    shares: list[float] = []
+    report = harness.measure(TINY, chosen, shares.append)
+    first, second, other = report.rows
+    assert report.agreed
+    assert (first.ratio, second.ratio) == (1.0, 1.0)
+    assert other.ratio == other.ns_per_eval / first.ns_per_eval
+    assert first.difference == 0.0 < other.difference < other.tolerance
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert report.machine["peak_gflops"] > 0.0
+    assert bench.machine_lines(report)
+
+
+def test_a_wrong_result_is_told() -> None:
+    def wrong(delta: problem.Floats, steps: int) -> problem.Floats:
+        return ours.reference("continuous")(delta, steps) * (1.0 + 1e-6)
+
+    cheat = problem.Contender("cheat", "continuous", "continuous", lambda: wrong)
+    report = harness.measure(TINY, [default("continuous"), cheat])
+    assert not report.agreed
+    assert report.rows[1].note == "result differs from springline's"
+
+
+def test_a_result_that_is_no_number_is_wrong_too() -> None:
+    broken = problem.Contender(
+        "broken", "continuous", "continuous", lambda: lambda delta, steps: np.full((delta.size, 8), np.nan)
+    )
+    assert not harness.measure(TINY, [default("continuous"), broken]).agreed
+
+
+def test_a_missing_package_is_told_and_does_no_harm() -> None:
+    absent = replace(handwritten_c.CONTENDERS[0], modules=("no_such_package",))
+    report = harness.measure(TINY, [default("continuous"), absent])
+    assert report.agreed
+    assert math.isnan(report.rows[1].ns_per_eval)
+    assert "no_such_package" in report.rows[1].note
+    assert "springline[bench]" in report.rows[1].note
+
+
+def test_of_several_batch_sizes_the_fastest_is_shown() -> None:
+    slow, fast = (harness.Row("JAX", "continuous", ns, batch=batch) for ns, batch in ((400.0, 64), (300.0, 1024)))
+    other = harness.Row("JAX", "sampled", 200.0)
+    assert harness.fastest([slow, fast, other]) == [fast, other]
+
+
+def test_compilers_are_timed_cold_and_cached() -> None:
+    cold, cached = compile_times(handwritten_c.CONTENDERS[0])
+    assert cold > cached >= 0.0
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="operations are counted in x86-64 machine code")
+def test_operations_are_counted_in_the_machine_code(require_tool: Callable[..., str]) -> None:
+    require_tool("objdump", "it comes with gcc, in binutils")
+    counts = [
+        roofline.flops_per_evaluation(ours.build_kernel("continuous", replace(ours.DEFAULT, width=width, groups=2)))
+        for width in (2, 4)
+    ]
+    # The equations alone take about 250, the elementary functions as much again; the count belongs to one run,
+    # however many are in a vector.
+    assert all(300 < count < 1000 for count in counts)
+    assert counts[0] == pytest.approx(counts[1], rel=0.1)
+
+
+def test_the_command_writes_rows_a_chart_and_json(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(harness, "QUICK", TINY)
+    command.bench(output=tmp_path / "bench", quick=True, only="handwritten", as_json=True)
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["command"], answer["status"]) == ("bench", "ok")
+    assert {"contender", "variant", "ns_per_eval", "ratio"} <= answer["rows"][0].keys()
+    assert {row["contender"].partition(",")[0] for row in answer["rows"]} == {"springline", "handwritten C"}
+    assert answer["units"]["ns_per_eval"] == "ns"
+    assert {path.name for path in (tmp_path / "bench").iterdir()} == set(bench.OUTPUTS)
+    kept = json.loads((tmp_path / "bench" / "bench.json").read_text())
+    assert kept["rows"] == answer["rows"]
+    assert kept["machine"]["versions"]["casadi"]
+
+
+def test_the_table_has_a_cell_for_every_column() -> None:
+    rows = [harness.Row("a", "continuous", 12_345.6, 2.0, difference=3e-12), harness.Row("b", "sampled", note="absent")]
+    lines = bench.table(rows)
+    assert {len(line) for line in lines} == {len(bench.COLUMNS)}
+    assert lines[0][2:6] == ["12,346", "2", "1,975", "3e-12"]
+    assert lines[1][2:] == ["–", "–", "–", "–", "–", "–", "absent"]
