@@ -1,6 +1,7 @@
 """What a sweep costs beyond its kernel, and what a second thread brings: `python -m benchmarks.batch_throughput`.
 
-Three things are timed in turn in one process, several times over, and the best of each counts:
+Three things are timed in turn in one process, several times over, and the best of each counts. Processor time is given
+beside it: on a machine that others use too, it alone tells what storing and drawing cost.
 
     kernel  the compiled loop alone, called with the same runs by the same number of threads
     batch   the same runs as a sweep: drawn, simulated, stored in a dataset
@@ -16,6 +17,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,7 +43,26 @@ RUN = 4.0  # s, the run that the projection is for
 MILLION = 1_000_000
 
 
-def kernel_seconds(plan: Plan, threads: int) -> float:
+class Times(NamedTuple):
+    """Seconds on the clock, and of all processors."""
+
+    wall: float
+    cpu: float
+
+
+class Stopwatch:
+    def __init__(self) -> None:
+        self._start = time.perf_counter(), time.process_time()
+
+    def read(self) -> Times:
+        return Times(time.perf_counter() - self._start[0], time.process_time() - self._start[1])
+
+
+def best(times: list[Times]) -> Times:
+    return Times(min(t.wall for t in times), min(t.cpu for t in times))
+
+
+def kernel_times(plan: Plan, threads: int) -> Times:
     """The loop alone: every thread takes packs until there are none."""
     work = plan.groups[0].work
     loop, settings = work.kernel(), replace(work.settings, output_every=0)
@@ -49,22 +70,22 @@ def kernel_seconds(plan: Plan, threads: int) -> float:
     parameters = np.concatenate([plan.parameters(chunk, plan.columns(chunk)) for chunk in chunks])
     pieces = [parameters[i : i + plan.chunk_size] for i in range(0, len(parameters), plan.chunk_size)]
     with ThreadPoolExecutor(threads) as pool:
-        start = time.perf_counter()
+        watch = Stopwatch()
         list(pool.map(lambda piece: loop.run(piece, settings, work.tables), pieces))
-        return time.perf_counter() - start
+        return watch.read()
 
 
-def batch_seconds(plan: Plan, threads: int) -> float:
+def batch_times(plan: Plan, threads: int) -> Times:
     """The sweep, from the first draw to the last part on the disk."""
     with tempfile.TemporaryDirectory() as folder:
         dataset = Dataset(place(Path(folder)))
         dataset.begin(plan, versions(), resume=False)
         with open_pool(threads) as pool:
-            start = time.perf_counter()
+            watch = Stopwatch()
             tally = run_sweep(plan, dataset, pool, set())
-            seconds = time.perf_counter() - start
+            times = watch.read()
     assert tally.done == plan.runs, tally
-    return seconds
+    return times
 
 
 def measure(runs: int, duration: float, threads: int, repeats: int) -> dict[str, float]:
@@ -74,21 +95,19 @@ def measure(runs: int, duration: float, threads: int, repeats: int) -> dict[str,
         file.write_text(SWEEP.format(runs=runs, duration=duration), encoding="utf-8")
         plan = Plan(load_sweep(file))
     plan.groups[0].work.kernel()
-    kernel, batch, single = [], [], []
-    for _ in range(repeats):
-        kernel.append(kernel_seconds(plan, threads))
-        batch.append(batch_seconds(plan, threads))
-        single.append(batch_seconds(plan, 1))
+    rounds = [(kernel_times(plan, threads), batch_times(plan, threads), batch_times(plan, 1)) for _ in range(repeats)]
+    kernel, batch, single = (best([each[i] for each in rounds]) for i in range(3))
     return {
         "runs": runs,
         "duration": duration,
         "threads": threads,
-        "kernel_runs_per_s": runs / min(kernel),
-        "batch_runs_per_s": runs / min(batch),
-        "single_runs_per_s": runs / min(single),
-        "batch_over_kernel": min(kernel) / min(batch),
-        "threads_over_one": min(single) / min(batch),
-        "million_4s_runs_s": min(batch) / runs * MILLION * RUN / duration,
+        "kernel_runs_per_s": runs / kernel.wall,
+        "batch_runs_per_s": runs / batch.wall,
+        "single_runs_per_s": runs / single.wall,
+        "batch_over_kernel": kernel.wall / batch.wall,
+        "batch_over_kernel_cpu": kernel.cpu / batch.cpu,
+        "threads_over_one": single.wall / batch.wall,
+        "million_4s_runs_s": batch.wall / runs * MILLION * RUN / duration,
     }
 
 
@@ -110,6 +129,7 @@ def main() -> None:
     print(f"  batch, {chosen.threads} threads          {found['batch_runs_per_s']:10.1f} runs/s")
     print(f"  batch, 1 thread           {found['single_runs_per_s']:10.1f} runs/s")
     print(f"  batch / kernel alone      {found['batch_over_kernel']:10.3f}")
+    print(f"    in processor time       {found['batch_over_kernel_cpu']:10.3f}")
     print(f"  {chosen.threads} threads / 1             {found['threads_over_one']:10.3f}")
     print(f"  a million 4 s runs        {time_text(found['million_4s_runs_s']):>10}")
 

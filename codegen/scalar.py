@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
 import casadi as ca
 import numpy as np
@@ -45,8 +46,8 @@ _CALLS = {
 }
 _NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
 
-# Guards of the model that a float cannot hold, and what does their duty there: TINY_FLOAT**(-4/3), the steepest power
-# on the control's way, and exp(LARGEST_EXPONENT_FLOAT) times a gain of 20 are still finite.
+# Guards among the model's constants that a float cannot hold, and what does their duty there: 1e-24**(-4/3), the
+# steepest power on the control's way, and exp(85) times a gain of 20 are still finite.
 _SINGLE = {TINY: 1e-24, LARGEST_EXPONENT: 85.0}
 
 
@@ -62,11 +63,10 @@ def literal(value: float, real: Real) -> str:
         return f"SL{f}_INF" if value > 0 else f"-SL{f}_INF"
     if real == "double":
         return _with_point(repr(value))
-    value = math.copysign(_SINGLE.get(abs(value), abs(value)), value)
     with np.errstate(over="ignore", under="ignore"):
         single = np.float32(value)
     if value != 0.0 and (single == 0.0 or not np.isfinite(single)):
-        raise ValueError(f"the constant {value!r} of the model cannot be a float: export with real = 'double'")
+        raise ValueError(f"{value!r} cannot be a float: export with real = 'double'")
     return _with_point(np.format_float_scientific(single, trim="-") if _extreme(value) else str(single)) + "f"
 
 
@@ -78,6 +78,21 @@ def _with_point(text: str) -> str:
     return text if any(c in text for c in ".e") else text + ".0"
 
 
+class _SinglePrecision:
+    """A Function whose own constants are such that floats can hold them; parameters are left alone."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self._function = function
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._function, name)
+
+    def instruction_constant(self, k: int) -> float:
+        """The constant of instruction k."""
+        value = float(self._function.instruction_constant(k))
+        return _SINGLE.get(value, value)
+
+
 class _Values(Graph):
     """Value graph of an export: references, measurements, base motion and commands come from outside.
 
@@ -86,6 +101,7 @@ class _Values(Graph):
 
     def __init__(self, export: Export) -> None:
         self.nodes, self.outputs, self._index = [], {}, {}
+        self._single = export.real == "float"
         self.tunable = tuple(slot.key for slot in export.tunable_slots)
         column = {slot: k for k, slot in enumerate(export.tunable)}
         self._known = {
@@ -105,7 +121,8 @@ class _Values(Graph):
             else [self._leaf(name, k, Binding.STATE) for k in range(function.numel_in(i))]
             for i, name in enumerate(names)
         ]
-        return [i for output in self.add(function.name(), function, inputs) for i in output]
+        printed = cast(ca.Function, _SinglePrecision(function)) if self._single else function
+        return [i for output in self.add(function.name(), printed, inputs) for i in output]
 
 
 @dataclass(frozen=True, slots=True)

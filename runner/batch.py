@@ -240,7 +240,7 @@ def run_sweep(
         if not pending:
             break
         ended, _ = wait(pending, timeout=_REFRESH, return_when=FIRST_COMPLETED)
-        for future in ended:
+        for future in sorted(ended, key=lambda item: pending[item][0].number):
             chunk, columns, attempt = pending.pop(future)
             try:
                 outcome = future.result()

@@ -16,8 +16,8 @@ Floats = NDArray[np.float64]
 class Measured:
     """One run as it is judged.
 
-    columns  trajectory by column name, rows equally spaced in time; besides the columns of a Result:
-             dq1d_<joint>, velocity_error_<joint> (dq1d - dq1)
+    columns  trajectory by column name, rows equally spaced in time; the cases of the paper have, besides the columns of
+             a Result, dq1d_<joint> and velocity_error_<joint> (dq1d - dq1)
     metrics  <metric>_<joint> -> value, NaN where there is none
     status   "ok", or why the run stopped;  message  the same as a sentence
     """

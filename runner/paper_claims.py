@@ -291,7 +291,7 @@ def _bounds(evidence: Evidence) -> Outcome:
                 "same is due to the "
                 "terms with k2 and k3, which the proof leaves out",
             ),
-            Check(f"{case.name}: both joints settle within it", kept),
+            Check(f"{case.name}: both joints settle, no later than any bound there is", kept),
         ]
     return checks, numbers
 

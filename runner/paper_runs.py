@@ -78,6 +78,9 @@ LIMITS: Mapping[str, Experiment] = {
 }
 """Limit on the reaching law, base at rest."""
 
+Key = tuple[Any, ...]
+"""What a run is for: ("case", scenario name, whether the step is halved), or an experiment's likewise."""
+
 Twice = tuple[Measured, Measured]
 """A run with the scenario's step, and with half of it."""
 
@@ -112,7 +115,7 @@ def study(groups: Sequence[int], *, whole: bool, progress: Progress | None = Non
     """
     names = [case.scenario for case in cases(groups)]
     tables = (LITERAL, READINGS, LAYERS, LIMITS) if whole else ()
-    wanted: dict[tuple[object, ...], tuple[str, Overrides]] = {("case", name): (name, {}) for name in names}
+    wanted: dict[Key, tuple[str, Overrides]] = {("case", name): (name, {}) for name in names}
     wanted |= {
         (number, key): (experiment.scenario, experiment.overrides)
         for number, table in enumerate(tables)
@@ -166,50 +169,58 @@ def _scenario(name: str, overrides: Overrides, half: bool) -> Scenario:
     )
 
 
-def _run_all(
-    scenarios: Mapping[tuple[object, ...], Scenario], progress: Progress | None
-) -> dict[tuple[object, ...], Measured]:
+def _run_all(scenarios: Mapping[Key, Scenario], progress: Progress | None) -> dict[Key, Measured]:
     """Run all scenarios, those that are the same only once; kernels are compiled side by side."""
-    jobs: dict[object, dict[object, list[tuple[object, ...]]]] = {}
+    jobs: dict[Structure, dict[object, list[Key]]] = {}
     for key, scenario in scenarios.items():
-        linear = key[0] == "linear"
-        structure = _linear_structure(scenario) if linear else scenario.structure()
+        structure = _linear_structure(scenario) if key[0] == "linear" else scenario.structure()
         program(structure)  # symbolic work belongs to one thread: CasADi's options are global
         same = (scenario.values().tobytes(), scenario.step, scenario.steps, scenario.output_every)
-        jobs.setdefault((linear, structure), {}).setdefault(same, []).append(key)
-    total = sum(len(group) for group in jobs.values())
-    done: dict[tuple[object, ...], Measured] = {}
+        jobs.setdefault(structure, {}).setdefault(same, []).append(key)
+    total = sum(len(runs) for runs in jobs.values())
+    done: dict[Key, Measured] = {}
     guard, finished = Lock(), 0
 
-    def work(group: Iterable[list[tuple[object, ...]]]) -> None:
+    def work(runs: Iterable[list[Key]]) -> None:
         nonlocal finished
-        for keys in group:
+        for keys in runs:
             scenario = scenarios[keys[0]]
             result = _linear(scenario) if keys[0][0] == "linear" else simulate(scenario)
             with guard:  # CasADi again
                 run = measure(scenario, result)
+                if any(key[0] == "case" for key in keys):
+                    run = with_velocities(scenario, run)
                 done.update((key, run) for key in keys)
                 finished += 1
                 if progress is not None:
                     progress(finished / total)
 
     with ThreadPoolExecutor(cpu_count() or 1) as pool:
-        for future in [pool.submit(work, list(group.values())) for group in jobs.values()]:
-            future.result()
+        try:
+            for future in [pool.submit(work, list(runs.values())) for runs in jobs.values()]:
+                future.result()
+        except BaseException:  # Ctrl-C above all: what has not begun need not
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     return done
 
 
 def measure(scenario: Scenario, result: Result) -> Measured:
-    """A Result with the wished velocities and their errors beside its columns, NaN for metrics that do not exist."""
-    columns: dict[str, Floats] = {name: result.trajectory[name].to_numpy() for name in result.trajectory.column_names}
-    system = scenario.system()
-    wished = _signals(system, scenario, columns["t"])[system.n : 2 * system.n]
-    for joint, rate in zip(system.joints, wished, strict=True):
-        columns[f"dq1d_{joint.name}"] = rate
-        columns[f"velocity_error_{joint.name}"] = rate - columns[f"dq1_{joint.name}"]
+    """A Result as it is judged, with NaN for metrics that do not exist."""
+    columns = {name: result.trajectory[name].to_numpy() for name in result.trajectory.column_names}
     (row,) = result.metrics.to_pylist()
     metrics = {key: float("nan") if value is None else float(value) for key, value in row.items() if key != "status"}
     return Measured(columns, metrics, result.status, result.message)
+
+
+def with_velocities(scenario: Scenario, run: Measured) -> Measured:
+    """The run with the wished velocities and their errors beside its columns."""
+    system, columns = scenario.system(), dict(run.columns)
+    wished = _signals(system, scenario, run["t"])[system.n : 2 * system.n]
+    for joint, rate in zip(system.joints, wished, strict=True):
+        columns[f"dq1d_{joint.name}"] = rate
+        columns[f"velocity_error_{joint.name}"] = rate - columns[f"dq1_{joint.name}"]
+    return replace(run, columns=columns)
 
 
 def _signals(system: System, scenario: Scenario, t: Floats) -> Floats:

@@ -33,12 +33,15 @@ Columns = dict[str, NDArray[Any]]
 
 MOST_GROUPS = 256
 
-# A chunk is what a kill loses and what a thread takes at a time: some seconds of work, but no more runs than keep
-# memory flat. Whole packs for every vector width in use.
+# A chunk is what a kill loses and what a thread takes at a time. Of a large sweep it is some seconds of work, but no
+# more runs than keep memory flat; of a small one it is enough to make the milliseconds of drawing and storing it not
+# matter, but little enough to occupy several threads. Whole packs for every vector width in use.
 _PACKS = 32
-_STEPS_PER_CHUNK = 4e7
+_MOST_STEPS = 4e7
+_FEWEST_STEPS = 4e6
 _LARGEST_CHUNK = 4096
-_FEWEST_CHUNKS = 64
+_CHUNKS = 32
+_FEWEST_CHUNKS = 8
 _TRAJECTORY_BYTES = 64e6
 _DEVIATIONS = 8.3  # the farthest that sampling.normal reaches
 _SCAN = 65536
@@ -115,7 +118,8 @@ class Plan:
 
     def _fitting_chunk(self) -> int:
         steps = max(group.work.settings.steps for group in self.groups)
-        size = min(_STEPS_PER_CHUNK / steps, _LARGEST_CHUNK, self.runs / _FEWEST_CHUNKS)
+        size = max(self.runs / _CHUNKS, min(_FEWEST_STEPS / steps, self.runs / _FEWEST_CHUNKS))
+        size = min(size, _MOST_STEPS / steps, _LARGEST_CHUNK)
         if self.sweep.keep:
             system, rows = self.groups[0].work.system, max(group.work.settings.rows for group in self.groups)
             kept = 8 * rows * len(trajectory_schema(system)) / self.sweep.keep

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 
 import casadi as ca
 import numpy as np
@@ -53,8 +53,12 @@ def build_cvodes() -> problem.Runner:
     system = {"t": t, "x": x, "p": delta, "ode": ode}
     options = {"reltol": 1e-6, "abstol": 1e-9, "max_num_steps": 10_000_000}
 
+    @cache
+    def solver(steps: int) -> ca.Function:
+        return ca.integrator("solve", "cvodes", system, 0.0, steps * problem.STEP, options)
+
     def run(delta: problem.Floats, steps: int) -> problem.Floats:
-        solve = ca.integrator("solve", "cvodes", system, 0.0, steps * problem.STEP, options)
+        solve = solver(steps)
         return np.array([solve(x0=problem.INITIAL_STATE, p=d)["xf"].full()[:, 0] for d in delta.tolist()])
 
     return run

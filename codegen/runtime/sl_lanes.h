@@ -60,7 +60,8 @@ typedef __typeof__((sl_v){0} < (sl_v){0}) sl_m;
 #define SL_NATIVE 8
 typedef __m512d sl_native;
 #define SL_NATIVE_SELECT(m, a, b) \
-  _mm512_castsi512_pd(_mm512_ternarylogic_epi64(_mm512_castpd_si512(m), _mm512_castpd_si512(a), _mm512_castpd_si512(b), 0xca))
+  _mm512_castsi512_pd(_mm512_ternarylogic_epi64(_mm512_castpd_si512(m), _mm512_castpd_si512(a), \
+                                                _mm512_castpd_si512(b), 0xca /* m ? a : b */))
 #define SL_NATIVE_PICK(at, a, b) _mm512_mask_blend_pd(_mm512_movepi64_mask(_mm512_castpd_si512(at)), a, b)
 #define SL_NATIVE_TOPS(m) ((unsigned)_mm512_movepi64_mask(_mm512_castpd_si512(m)))
 #define SL_NATIVE_MIN _mm512_min_pd

@@ -2,7 +2,7 @@
  * sl_math.h - elementary functions that give the same bits everywhere.
  *
  * Every result is a function of the argument bits alone: the kernels use IEEE double +, -, *, /, sqrt,
- * comparisons and integer operations, nothing else.  No libm call, no table in memory, no state, no FMA.
+ * comparisons and integer operations, nothing else.  No libm call, no lookup table, no state, no FMA.
  * Any C99 compiler, optimisation level and instruction set agrees to the last bit, provided that the
  * compiler does not contract a*b+c (pass -ffp-contract=off) and evaluates double as double.
  *
@@ -23,7 +23,7 @@
 #ifdef __FAST_MATH__
 #error "sl_math.h needs IEEE arithmetic: compile without -ffast-math"
 #endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
 #error "sl_math.h needs doubles evaluated as double: on 32-bit x86 compile with -msse2 -mfpmath=sse"
 #endif
 #ifdef __clang__
@@ -46,11 +46,11 @@
 #define SL_NAN (sl_real(UINT64_C(0x7ff8000000000000)))
 #define SL_SIGN_BIT UINT64_C(0x8000000000000000)
 #define SL_EXPONENT UINT64_C(0x7ff0000000000000)
-#define SL_HIGH_26 UINT64_C(0xfffffffff8000000) /* keeps 26 significant bits: the square of the rest is exact */
 #define SL_FRACTION UINT64_C(0x000fffffffffffff)
-#define SL_ONE UINT64_C(0x3ff0000000000000)
-#define SL_ROUND 0x1.8p52 /* x + SL_ROUND rounds x to an integer and holds it in the low bits */
-#define SL_LN2_HI 0x1.62e42fefa38p-1 /* 42 bits: exact times an exponent */
+#define SL_ONE UINT64_C(0x3ff0000000000000)     /* the bits of 1.0 */
+#define SL_HIGH_26 UINT64_C(0xfffffffff8000000) /* leaves 26 significant bits: two such have an exact product */
+#define SL_ROUND 0x1.8p52                       /* x + SL_ROUND holds x, rounded to an integer, in its low bits */
+#define SL_LN2_HI 0x1.62e42fefa38p-1            /* 42 bits: times an exponent it is exact */
 #define SL_LN2_LO 0x1.ef35793c7673p-45
 
 typedef union {
@@ -84,7 +84,7 @@ static inline int sl_below(uint64_t a, uint64_t limit) { return a < limit; }
 static inline double sl_fmin(double a, double b) { return a < b ? a : b; }
 static inline double sl_fmax(double a, double b) { return a > b ? a : b; }
 
-/* The correctly rounded root by integer arithmetic alone, digit by digit, for targets without a square-root instruction. */
+/* The correctly rounded root in integers, digit by digit, for targets without a square-root instruction. */
 static inline double sl_sqrt_soft(double x) {
   uint64_t m = sl_bits(x), root = 0, twice = 0, digit;
   int e;
@@ -763,7 +763,8 @@ static inline void SL_FN(pow_log)(SL_B shifted, SL_F y, double bias, SL_F *hi, S
   SL_F sl = ((f - sh * uh) - sh * (m - (uh - c))) * v, ds = (sh - s) + sl; /* s + ds is the better s */
   SL_F z = s * s, w = z * z;
   SL_F p = (0x1.5555555555555p-1 + z * 0x1.9999999999ac0p-2) +
-           w * ((0x1.2492492413f3bp-2 + z * 0x1.c71c74dd75d28p-3) + w * (0x1.745845c8bb19fp-3 + z * 0x1.3eba96fda56c4p-3));
+           w * ((0x1.2492492413f3bp-2 + z * 0x1.c71c74dd75d28p-3) +
+                w * (0x1.745845c8bb19fp-3 + z * 0x1.3eba96fda56c4p-3));
   SL_F kl = k * SL_LN2_HI, t = kl + log_c, tl = (kl - t) + log_c;
   SL_F sh2 = sh + sh, h = t + sh2, rest = (tl + k * SL_LN2_LO) + ((sl + sl) + (z + z) * ds);
   SL_F l = (((t - h) + sh2) + rest) + (s * z) * p;
@@ -836,7 +837,7 @@ static inline SL_F SL_CHECKED(pow_general)(SL_F x, SL_F y SL_OK) {
 #ifdef SL_CORES
 #define SL_POW_ALL(value, name) if (SL_FN(all)(y == (value))) return SL_FN(pow_##name)(x);
 #define SL_POW_ANY(value, name) if (SL_FN(any)(y == (value))) r = SL_FN(select)(y == (value), SL_FN(pow_##name)(x), r);
-/* pow where at least one lane may have a listed exponent. */
+/* pow where at least one lane may have a listed exponent: one branch if all have the same, else lane by lane. */
 SL_POW_INLINE SL_F SL_FN(pow_listed)(SL_F x, SL_F y) {
   SL_F r;
   SL_POW_LIST(SL_POW_ALL)

@@ -2,7 +2,7 @@
  * sl_math.h - elementary functions that give the same bits everywhere.
  *
  * Every result is a function of the argument bits alone: the kernels use IEEE double +, -, *, /, sqrt,
- * comparisons and integer operations, nothing else.  No libm call, no table in memory, no state, no FMA.
+ * comparisons and integer operations, nothing else.  No libm call, no lookup table, no state, no FMA.
  * Any C99 compiler, optimisation level and instruction set agrees to the last bit, provided that the
  * compiler does not contract a*b+c (pass -ffp-contract=off) and evaluates double as double.
  *
@@ -23,7 +23,7 @@
 #ifdef __FAST_MATH__
 #error "sl_math.h needs IEEE arithmetic: compile without -ffast-math"
 #endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
 #error "sl_math.h needs doubles evaluated as double: on 32-bit x86 compile with -msse2 -mfpmath=sse"
 #endif
 #ifdef __clang__
@@ -46,11 +46,11 @@
 #define SL_NAN (sl_real(UINT64_C(0x7ff8000000000000)))
 #define SL_SIGN_BIT UINT64_C(0x8000000000000000)
 #define SL_EXPONENT UINT64_C(0x7ff0000000000000)
-#define SL_HIGH_26 UINT64_C(0xfffffffff8000000) /* keeps 26 significant bits: the square of the rest is exact */
 #define SL_FRACTION UINT64_C(0x000fffffffffffff)
-#define SL_ONE UINT64_C(0x3ff0000000000000)
-#define SL_ROUND 0x1.8p52 /* x + SL_ROUND rounds x to an integer and holds it in the low bits */
-#define SL_LN2_HI 0x1.62e42fefa38p-1 /* 42 bits: exact times an exponent */
+#define SL_ONE UINT64_C(0x3ff0000000000000)     /* the bits of 1.0 */
+#define SL_HIGH_26 UINT64_C(0xfffffffff8000000) /* leaves 26 significant bits: two such have an exact product */
+#define SL_ROUND 0x1.8p52                       /* x + SL_ROUND holds x, rounded to an integer, in its low bits */
+#define SL_LN2_HI 0x1.62e42fefa38p-1            /* 42 bits: times an exponent it is exact */
 #define SL_LN2_LO 0x1.ef35793c7673p-45
 
 typedef union {
@@ -84,7 +84,7 @@ static inline int sl_below(uint64_t a, uint64_t limit) { return a < limit; }
 static inline double sl_fmin(double a, double b) { return a < b ? a : b; }
 static inline double sl_fmax(double a, double b) { return a > b ? a : b; }
 
-/* The correctly rounded root by integer arithmetic alone, digit by digit, for targets without a square-root instruction. */
+/* The correctly rounded root in integers, digit by digit, for targets without a square-root instruction. */
 static inline double sl_sqrt_soft(double x) {
   uint64_t m = sl_bits(x), root = 0, twice = 0, digit;
   int e;
@@ -312,21 +312,23 @@ static inline SL_F SL_CHECKED(cosh)(SL_F x SL_OK) {
   return r;
 }
 
-/* (e + e / (1 + e)) / 2 with e = exp|x| - 1; lo enters times the derivative. */
+/* (e + e / (1 + e)) / 2 with e + lo = exp|x| - 1; what the roundings of e and 1 + e left over enters to first order. */
 static inline SL_F SL_CHECKED(sinh)(SL_F x SL_OK) {
-  SL_F lo, e = SL_FN(expm1_sum)(SL_FN(fabs)(x), &lo), q = e / (1.0 + e);
-  SL_F r = SL_FN(copysign)(0.5 * (e + (q + lo * (1.0 + (1.0 - q) * (1.0 - q)))), x);
+  SL_F lo, e = SL_FN(expm1_sum)(SL_FN(fabs)(x), &lo), u = 1.0 + e, q = e / u, v = 1.0 - q;
+  SL_F r = 0.5 * (e + (q + (lo * (1.0 + v * v) - q * v * (e - (u - 1.0)))));
+  r = SL_FN(copysign)(r, x);
   SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, sinh_rare, x);
   return r;
 }
 
 #ifdef SL_CORES
-/* With e = exp(2|x|) - 1: e / (2 + e), which is 1 - 2 / (2 + e), and 1 to the last bit from 30 on. */
+/* With e + lo = exp(2|x|) - 1: e / (2 + e), mended likewise, which is 1 - 2 / (2 + e); 1 to the last bit from 30 on. */
 static inline SL_F SL_FN(tanh)(SL_F x) {
-  SL_F lo, a = SL_FN(fabs)(x), e = SL_FN(expm1_sum)(2.0 * SL_FN(fmin)(SL_FN(set)(30.0), a), &lo);
+  SL_F lo, a = SL_FN(fabs)(x), e = SL_FN(expm1_sum)(2.0 * SL_FN(fmin)(SL_FN(set)(30.0), a), &lo), u = 2.0 + e;
   SL_M small = a < 0.55;
-  SL_F q = SL_FN(select)(small, e, SL_FN(set)(2.0)) / (2.0 + e);
-  return SL_FN(copysign)(SL_FN(select)(small, q + lo * (0.5 * (1.0 - q) * (1.0 - q)), 1.0 - q), x);
+  SL_F q = SL_FN(select)(small, e, SL_FN(set)(2.0)) / u, v = 0.5 * (1.0 - q);
+  SL_F r = SL_FN(select)(small, q + v * (2.0 * v * lo - q * (e - (u - 2.0))), 1.0 - q);
+  return SL_FN(copysign)(r, x);
 }
 #endif
 
@@ -550,7 +552,8 @@ static inline SL_F SL_FN(atan)(SL_F x) {
 #ifdef SL_SCALAR
 /* Infinities are compared by kind, zeros lie on an axis, everything else only needs another scale. */
 SL_RARE double sl_atan2_rare(double y, double x) {
-  double a = sl_fabs(y), b = sl_fabs(x), scale = sl_fmax(a, b) > 1.0 ? 0x1p-100 : 0x1p100, r;
+  double a = sl_fabs(y), b = sl_fabs(x), most = sl_fmax(a, b), r;
+  double scale = most > 0x1p1000 ? 0x1p-100 : most < 0x1p-900 ? 0x1p100 : 1.0;
   if (x != x || y != y) return x + y;
   if (a == SL_INF || b == SL_INF) {
     a = sl_true(a == SL_INF);
@@ -760,7 +763,8 @@ static inline void SL_FN(pow_log)(SL_B shifted, SL_F y, double bias, SL_F *hi, S
   SL_F sl = ((f - sh * uh) - sh * (m - (uh - c))) * v, ds = (sh - s) + sl; /* s + ds is the better s */
   SL_F z = s * s, w = z * z;
   SL_F p = (0x1.5555555555555p-1 + z * 0x1.9999999999ac0p-2) +
-           w * ((0x1.2492492413f3bp-2 + z * 0x1.c71c74dd75d28p-3) + w * (0x1.745845c8bb19fp-3 + z * 0x1.3eba96fda56c4p-3));
+           w * ((0x1.2492492413f3bp-2 + z * 0x1.c71c74dd75d28p-3) +
+                w * (0x1.745845c8bb19fp-3 + z * 0x1.3eba96fda56c4p-3));
   SL_F kl = k * SL_LN2_HI, t = kl + log_c, tl = (kl - t) + log_c;
   SL_F sh2 = sh + sh, h = t + sh2, rest = (tl + k * SL_LN2_LO) + ((sl + sl) + (z + z) * ds);
   SL_F l = (((t - h) + sh2) + rest) + (s * z) * p;
@@ -833,7 +837,7 @@ static inline SL_F SL_CHECKED(pow_general)(SL_F x, SL_F y SL_OK) {
 #ifdef SL_CORES
 #define SL_POW_ALL(value, name) if (SL_FN(all)(y == (value))) return SL_FN(pow_##name)(x);
 #define SL_POW_ANY(value, name) if (SL_FN(any)(y == (value))) r = SL_FN(select)(y == (value), SL_FN(pow_##name)(x), r);
-/* pow where at least one lane may have a listed exponent. */
+/* pow where at least one lane may have a listed exponent: one branch if all have the same, else lane by lane. */
 SL_POW_INLINE SL_F SL_FN(pow_listed)(SL_F x, SL_F y) {
   SL_F r;
   SL_POW_LIST(SL_POW_ALL)

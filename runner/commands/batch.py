@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from springline.runner.batch import Estimate, Pool, Report, Tally
     from springline.runner.dataset import Dataset
     from springline.runner.plan import Plan
+    from springline.runner.summary import Summary
 
 _LONG = 3600.0
 _LARGE = 10e9
@@ -47,6 +48,7 @@ def batch(
             help="A dask scheduler, tcp://host:port, or local:N for N worker processes here.",
         ),
     ] = "",
+    plot: Annotated[bool, typer.Option(" /--no-plot", show_default=False, help="Draw no figures.")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print what became of the runs as JSON.")] = False,
 ) -> None:
     """Simulate every run of a sweep; write a table with one row a run, and a summary.
@@ -81,7 +83,7 @@ def batch(
             held = sum(plan.chunk(k).runs for k in dataset.done(plan))
             complain(f"stopped: {held:,} of {plan.runs:,} runs are stored; continue with: {again}")
             raise typer.Exit(130) from error
-        _finish(plan, dataset, tally, again, as_json=as_json)
+        _finish(plan, dataset, tally, again, plot=plot, as_json=as_json)
 
 
 def _describe(plan: Plan, cost: Estimate, pool: Pool, destination: str, *, as_json: bool) -> None:
@@ -117,40 +119,41 @@ def _warn(cost: Estimate, again: str) -> None:
         )
 
 
-def _finish(plan: Plan, dataset: Dataset, tally: Tally, again: str, *, as_json: bool) -> None:
-    """Summary and last words; exits with 1 if runs are missing."""
+def _finish(plan: Plan, dataset: Dataset, tally: Tally, again: str, *, plot: bool, as_json: bool) -> None:
+    """Summary and last words; exits with 1 if something failed."""
     from springline.runner.summary import metric_rows, outcome_rows, summarize, worst_rows
 
+    problems = [f"failed: {failure}" for failure in tally.failures]
     if tally.found + tally.done:
         summary = summarize(plan, dataset)
-        write_summary(plan, dataset, summary)
+        try:
+            write_summary(plan, dataset, summary, plot=plot)
+        except OSError as error:  # the runs are safe, and what lost some of them is told below
+            problems.append(f"failed: no summary: {error}")
         if as_json:
             rows = [{"group": name, **counts} for name, counts in summary.outcomes.items()]
-            print_json("batch", rows, {}, "ok" if tally.left == 0 else "failed")
+            print_json("batch", rows, {}, "failed" if problems else "ok")
         else:
-            for header, rows_of_text in (
-                outcome_rows(summary),
-                metric_rows(summary),
-                worst_rows(summary, [axis.key for axis in plan.sweep.axes]),
-            ):
+            keys = [axis.key for axis in plan.sweep.axes]
+            for header, rows_of_text in (outcome_rows(summary), metric_rows(summary), worst_rows(summary, keys)):
                 print_table(header, rows_of_text, right=header[1:])
-    if tally.left:
-        for failure in tally.failures:
-            complain(f"failed: {failure}")
+    if problems:
+        for problem in problems:
+            complain(problem)
         complain(f"{tally.left:,} of {plan.runs:,} runs are missing; once the cause is gone: {again}")
         raise typer.Exit(1)
     if not as_json:
         say(f"results: {dataset.place.name}")
 
 
-def write_summary(plan: Plan, dataset: Dataset, summary: Any) -> None:
+def write_summary(plan: Plan, dataset: Dataset, summary: Summary, *, plot: bool = True) -> None:
     """summary.md and its figures beside the parts."""
     from springline.runner.plots import figure_files
     from springline.runner.summary import markdown
     from springline.runner.sweep_plots import summary_figures
 
     names = []
-    for name, figure in summary_figures(plan, summary).items():
+    for name, figure in (summary_figures(plan, summary) if plot else {}).items():
         for file, content in figure_files(name, figure).items():
             dataset.place.write(file, content)
         names.append(f"{name}.png")

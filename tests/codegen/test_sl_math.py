@@ -324,7 +324,6 @@ MACHINE = ["-march=native"] if sys.platform.startswith("linux") else []
 BUILDS = [
     ("gcc", ["-O0", "-DSL_W=1"]),
     ("gcc", ["-O3", "-DSL_W=1", *MACHINE]),
-    ("gcc", ["-O3", "-DSL_W=2"]),
     ("gcc", ["-O0", "-DSL_W=4", *MACHINE]),
     ("gcc", ["-O3", "-DSL_W=4", *MACHINE, "-fschedule-insns", "-fsched-pressure"]),
     ("gcc", ["-O1", "-DSL_W=16", *MACHINE]),

@@ -1,5 +1,6 @@
 """Sweeps from file to dataset: the same table however they are run, and what happens when something breaks."""
 
+import importlib
 import importlib.util
 import json
 import os
@@ -210,10 +211,8 @@ def _parts(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("address", ["local:0", "local:x", "somewhere", "tcp://127.0.0.1:1"])
-def test_a_bad_scheduler_is_the_users_mistake(
-    address: str, distributed: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("springline.runner.batch._ANSWER", "0.5s")
+def test_a_bad_scheduler_is_the_users_mistake(address: str, distributed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.import_module("springline.runner.batch"), "_ANSWER", "0.5s")
     with pytest.raises(InputError, match="--scheduler"), open_pool(None, address):
         pass
 
@@ -263,7 +262,10 @@ def test_a_bad_chunk_is_tried_again_then_reported_and_the_rest_goes_on(sweep: Pa
 
 def test_three_lost_chunks_in_a_row_end_a_sweep(sweep: Path, tmp_path: Path) -> None:
     tally = run(sweep, tmp_path / "a", chunk=32, pool=_failing(sweep, dict.fromkeys(range(3, 10), 99)))
-    assert (tally.done, tally.failed, tally.left) == (96, 96, 204)
+    # Chunk 2 is under way beside chunk 3: whether it counts between two that were lost is a matter of time.
+    assert tally.done == 96
+    assert tally.failed in (96, 128)
+    assert tally.left == 204
 
 
 def test_without_a_compiler_a_sweep_fails_at_once(
@@ -297,7 +299,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_resume(
     stored = int(re.search(r"stopped: ([\d,]+) of 2,000 runs are stored", done.stderr)[1].replace(",", ""))
     assert 96 <= stored < 2000
     assert f"springline batch {sweep} -o {folder} --resume" in done.stderr.replace("\n", " ")
-    again = command("batch", sweep, "-o", folder, "--resume", "--json")
+    again = command("batch", sweep, "-o", folder, "--resume", "--no-plot", "--json")
     assert again.exit_code == 0
     assert json.loads(again.stdout)["rows"] == [{"group": "all", "ok": 2000, "diverged": 0, "out_of_bounds": 0}]
 
@@ -317,7 +319,7 @@ def test_batch_writes_a_dataset_with_its_summary(sweep: Path, tmp_path: Path, co
     assert "![map](map.png)" in text
     assert "300 of 300 runs" in text
     stored = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
-    assert (stored["runs"], stored["chunk"], len(stored["groups"])) == (300, 32, 1)
+    assert (stored["runs"], stored["chunk"], len(stored["groups"])) == (300, 64, 1)
     assert re.fullmatch("[0-9a-f]{64}", stored["groups"][0]["kernel"])
 
 
@@ -327,7 +329,7 @@ def test_replay_is_bit_identical_and_notices_what_is_not(sweep: Path, tmp_path: 
     text = SWEEP.split("[vary]", maxsplit=1)[0].replace("samples = 300", 'method = "grid"') + "[vary]\n" + vary
     sweep.write_text(text, encoding="utf-8")
     folder = tmp_path / "data"
-    assert command("batch", sweep, "-o", folder).exit_code == 0
+    assert command("batch", sweep, "-o", folder, "--no-plot").exit_code == 0
     done = command("replay", folder, 17, "-o", tmp_path / "again", "--no-plot")
     assert done.exit_code == 0, done.output
     assert "bit for bit" in done.stdout
@@ -351,7 +353,7 @@ def test_dry_run_writes_nothing_and_its_size_is_about_right(sweep: Path, tmp_pat
     done = command("batch", sweep, "-o", folder, "--dry-run", "--json")
     assert done.exit_code == 0, done.output
     facts = json.loads(done.stdout)["rows"][0]
-    assert (facts["runs"], facts["groups"], facts["chunks"], facts["chunk"]) == (300, 1, 10, 32)
+    assert (facts["runs"], facts["groups"], facts["chunks"], facts["chunk"]) == (300, 1, 5, 64)
     assert 0 < facts["seconds"] < 10
     assert not folder.exists()
     assert "about" in command("batch", sweep, "-o", folder, "--dry-run").stdout
@@ -364,7 +366,7 @@ def test_a_long_sweep_says_so_before_it_starts(
     sweep: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("springline.runner.commands.batch._LONG", 0.0)
-    done = command("batch", sweep, "-o", tmp_path / "data")
+    done = command("batch", sweep, "-o", tmp_path / "data", "--no-plot")
     assert done.exit_code == 0
     assert "this will take about" in done.stderr
 

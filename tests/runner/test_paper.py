@@ -26,7 +26,7 @@ from springline.runner.paper import Reproduction, reproduce
 from springline.runner.paper_cases import CASES, GROUPS, JOINTS, MEASURES, cases
 from springline.runner.paper_figures import FIGURES, OPEN_FIGURES
 from springline.runner.paper_report import change, number, plain
-from springline.runner.paper_runs import E8_SHAKE, measure, reaching_law, theory_of
+from springline.runner.paper_runs import E8_SHAKE, measure, reaching_law, theory_of, with_velocities
 from springline.runner.scenario import load_scenario, packaged_scenarios
 from springline.runner.simulate import simulate
 
@@ -84,6 +84,12 @@ def test_a_boundary_layer_of_002_chatters_and_one_of_003_does_not() -> None:
     clean = seen(control__delta=0.03)
     assert clean.metric("steady_state_error", "lift") < 1e-5
     assert clean.variation_rate("sigma_lift", 1.0) < 1
+
+
+def test_a_lighter_payload_needs_a_wider_boundary_layer() -> None:
+    lighter = {"plant__m3": {"scale": 0.8}, "plant__J": {"scale": 0.8}}
+    assert seen(control__delta=0.03, **lighter).metric("steady_state_error", "lift") > 0.01
+    assert seen(control__delta=0.04, **lighter).metric("steady_state_error", "lift") < 0.002
 
 
 def test_the_literal_surface_does_not_settle() -> None:
@@ -174,7 +180,7 @@ def test_the_theory_is_measured_along_the_run() -> None:
 
 
 def test_velocity_errors_are_those_of_the_reference() -> None:
-    run = seen(simulation__duration=0.5)
+    run = with_velocities(load_scenario("paper/nominal"), seen(simulation__duration=0.5))
     assert run["dq1d_lift"] == pytest.approx(np.pi * np.cos(np.pi * run["t"]))
     assert run["velocity_error_rotation"] == pytest.approx(run["dq1d_rotation"] - run["dq1_rotation"])
 

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FMU_OK = 0, FMU_ERROR = 1 };
+enum { FMU_OK = 0, FMU_ERROR = 1, FMU_MESSAGE = 512 };
 
 enum {
   FMU_INSTANTIATED = 1,
@@ -54,7 +54,7 @@ static int fmu_advance(fmu_instance *fmu, double until);  /* goes on to a later 
 /* ---- messages ---------------------------------------------------------------------------------------------- */
 
 static int fmu_refuse(const fmu_instance *fmu, const char *format, ...) {
-  char message[512];
+  char message[FMU_MESSAGE];
   va_list arguments;
   va_start(arguments, format);
   (void)vsnprintf(message, sizeof message, format, arguments);
@@ -129,7 +129,7 @@ static int fmu_configure(fmu_instance *fmu) {
   springline_config config = springline_default_config;
   int status;
   if (fmu->configured) return SPRINGLINE_OK;
-  FMU_GET_PARAMETERS(fmu->now.values + FMU_AT_PARAMETERS, &config);
+  fmu_get_parameters(fmu->now.values + FMU_AT_PARAMETERS, &config);
   status = springline_init(&fmu->controller, &config);
   fmu->configured = status == SPRINGLINE_OK;
   return status;

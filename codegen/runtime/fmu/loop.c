@@ -16,7 +16,11 @@ static int fmu_control(fmu_instance *fmu, const springline_reference *reference,
 
 static int fmu_evaluate(fmu_instance *fmu) {
   double *v = fmu->now.values, seen[FMU_DIAGNOSTICS];
-  const int sampling = FMU_HOLD == 0 || (!fmu->now.between && fmu->now.step % (FMU_HOLD + !FMU_HOLD) == 0);
+#if FMU_HOLD > 0
+  const int sampling = !fmu->now.between && fmu->now.step % FMU_HOLD == 0;
+#else
+  const int sampling = 1;
+#endif
   springline_reference reference;
   springline_base base;
   springline_command command;

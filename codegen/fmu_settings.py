@@ -1,0 +1,24 @@
+"""What an FMU is told about time: the scenario's steps, samples and duration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+FmiVersion = Literal[2, 3]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Times of an FMU.
+
+    duration  of the default experiment, s
+    step      of the plant's integrator, s
+    period    sample period of the control, a whole number of steps, s; 0 for continuous control
+    bound     largest |x_i| of the plant, SI units
+    """
+
+    duration: float
+    step: float
+    period: float = 0.0
+    bound: float = 1e6

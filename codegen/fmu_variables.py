@@ -1,0 +1,166 @@
+"""What an FMU shows of itself: the variables of each part, in the order of their value references."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import casadi as ca
+
+from springline.codegen.export import Export
+from springline.codegen.typed import Field, TypedInterface
+from springline.model.base import COORDINATES
+from springline.model.parameters import REAL, Bounds
+from springline.model.system import System
+
+Part = Literal["controller", "plant", "loop"]
+Causality = Literal["independent", "parameter", "input", "output"]
+
+PARTS: tuple[Part, ...] = ("controller", "plant", "loop")
+
+_MEANINGS = {
+    "q1d": "reference of the joint coordinate",
+    "dq1d": "reference of the joint rate",
+    "ddq1d": "reference of the joint acceleration",
+    "q1": "joint coordinate",
+    "dq1": "joint rate",
+    "q2": "motor coordinate, reflected to the joint",
+    "dq2": "motor rate, reflected to the joint",
+    "U": "command to the motor",
+    "e": "tracking error",
+    "sigma": "sliding variable",
+    "U_s": "slow part of the command, before its limit",
+    "U_f": "fast part of the command, before its limit",
+    "saturated": "whether U_max limits the command",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A scalar variable of an FMU; its value reference is its place in the list.
+
+    name    a parameter's is the scenario's key, another's that of the trajectory's column
+    start   start value, None where it is computed
+    fixed   a parameter that counts at initialization only
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    causality: Causality
+    start: float | None = None
+    bounds: Bounds = REAL
+    fixed: bool = False
+    boolean: bool = False
+
+    @property
+    def variability(self) -> str:
+        """FMI's word for when it may change."""
+        if self.causality == "parameter":
+            return "fixed" if self.fixed else "tunable"
+        return "discrete" if self.boolean else "continuous"
+
+
+@dataclass(frozen=True)
+class Interface:
+    """Variables of one part.
+
+    variables  by value reference; 0 is time
+    blocks     name of a structure of the C interface (or "parameters") -> value reference of its first entry; entries
+               follow in the structure's order
+    """
+
+    part: Part
+    variables: tuple[Variable, ...]
+    blocks: dict[str, int]
+
+    def of(self, *causalities: Causality) -> list[int]:
+        """Value references of the variables with one of these causalities."""
+        return [i for i, variable in enumerate(self.variables) if variable.causality in causalities]
+
+
+def base_is_input(system: System, part: Part) -> bool:
+    """Whether the importer moves the base: where the scenario does not."""
+    return part != "controller" and system.structure.base_motion.kind == "none"
+
+
+def part_parameters(system: System, part: Part) -> tuple[int, ...]:
+    """Indices of the slots that a part depends on, ascending."""
+    if part == "controller":
+        return _read(system, "control")
+    used = {*_read(system, "plant"), *_read(system, "start")}
+    if part == "loop":
+        used |= set(_read(system, "control"))
+    signals = {
+        i for i in _read(system, "signals") if part == "loop" or not system.slots[i].key.startswith("reference.")
+    }
+    return tuple(sorted(used | signals))
+
+
+def _read(system: System, name: str) -> tuple[int, ...]:
+    """Slots that the frozen Function `name` reads; p is its last input."""
+    function = system.function(name)
+    reads = (
+        function.instruction_input(k)
+        for k in range(function.n_instructions())
+        if function.instruction_id(k) == ca.OP_INPUT
+    )
+    return tuple(sorted(entry for source, entry in reads if source == function.n_in() - 1))
+
+
+def interface(export: Export, typed: TypedInterface, part: Part) -> Interface:
+    """The variables of a part: time, its tunable parameters, inputs, outputs."""
+    outside = base_is_input(export.system, part)
+    inputs: dict[Part, Sequence[str]] = {
+        "controller": ("reference", "measurement"),
+        "plant": ("command", *(["base"] if outside else [])),
+        "loop": ("base",) if outside else (),
+    }
+    outputs: dict[Part, Sequence[str]] = {
+        "controller": ("command", "diagnostics"),
+        "plant": ("state", *([] if outside else ["base"])),
+        "loop": ("state", "reference", "command", "diagnostics", *([] if outside else ["base"])),
+    }
+    variables = [Variable("time", "s", "time", "independent")]
+    blocks = {"parameters": len(variables)}
+    for slot, i in zip(export.tunable_slots, export.tunable, strict=True):
+        fixed = slot.key.startswith("initial.")
+        variables.append(Variable(slot.key, slot.unit, slot.meaning, "parameter", export.values[i], slot.bounds, fixed))
+    groups: Iterable[tuple[Causality, Sequence[str]]] = (("input", inputs[part]), ("output", outputs[part]))
+    for causality, structures in groups:
+        for structure in structures:
+            blocks[structure] = len(variables)
+            variables += [_signal(export.system, field, causality) for field in typed.structures[structure]]
+    return Interface(part, tuple(variables), blocks)
+
+
+def _signal(system: System, field: Field, causality: Causality) -> Variable:
+    start = 0.0 if causality == "input" else None
+    unit = "1" if field.integer else field.unit
+    return Variable(field.name, unit, _meaning(system, field.name), causality, start, boolean=field.integer)
+
+
+def _meaning(system: System, name: str) -> str:
+    for joint in system.joints:
+        quantity = name.removesuffix(f"_{joint.name}")
+        if quantity != name:
+            return f"{_MEANINGS[quantity]} ({joint.name})"
+    orders = {"dd_": "acceleration of the base, ", "d_": "rate of the base, ", "": "motion of the base, "}
+    for prefix, meaning in orders.items():
+        for coordinate in COORDINATES:
+            if name == prefix + coordinate.symbol:
+                return meaning + coordinate.key
+    raise KeyError(name)
+
+
+def closed_range(bounds: Bounds) -> tuple[float | None, float | None]:
+    """The least and the greatest admissible double, None where there is no limit or infinity is admissible."""
+    low = None if math.isinf(bounds.low) else bounds.low
+    high = None if math.isinf(bounds.high) else bounds.high
+    if low is not None and bounds.low_open:
+        low = math.nextafter(low, math.inf)
+    if high is not None and bounds.high_open:
+        high = math.nextafter(high, -math.inf)
+    return low, high

@@ -1,0 +1,125 @@
+"""Every example is built and run, with the export that is committed."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+import pytest
+
+from springline.codegen.api import generate_files
+from springline.codegen.manifest import write_tree
+from springline.runner import load_scenario
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES, EXPORT = ROOT / "examples", ROOT / "generated"
+# The Make that runs the tests hands its flags down; an example's Make is to be a fresh one.
+FRESH = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS"))}
+
+
+def run(*command: str | Path, environment: Mapping[str, str] = MappingProxyType({})) -> str:
+    words = [str(word) for word in command]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, env={**FRESH, **environment})
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    return done.stdout
+
+
+def make(folder: str, build: Path, *arguments: str) -> str:
+    return run("make", "-s", "-C", EXAMPLES / folder, f"EXPORT={EXPORT}", f"BUILD={build}", *arguments)
+
+
+def numbers(line: str) -> list[float]:
+    return [float(text) for text in re.findall(r"-?\d+\.\d+(?:e-?\d+)?", line)]
+
+
+def test_every_example_is_in_the_list() -> None:
+    folders = {path.name for path in EXAMPLES.iterdir() if path.is_dir() and path.name != "build"}
+    listed = set(re.findall(r"^\| `(\w+)` \|", (EXAMPLES / "README.md").read_text(), re.MULTILINE))
+    assert folders == listed
+
+
+def check_controller(printed: str) -> None:
+    """What plain_c/controller.c prints: it settles, and a sensor that is out is noticed three times."""
+    lines = printed.splitlines()
+    assert sum("a measurement is not a finite number" in line for line in lines) == 3
+    late = [numbers(line) for line in lines if line.startswith(("t = 0.8", "t = 0.9"))]
+    assert len(late) == 2
+    for _, lift, rotation, *_ in late:
+        assert abs(lift) < 1e-3
+        assert abs(rotation) < 1e-3
+
+
+def test_plain_c(tmp_path: Path) -> None:
+    check_controller(make("plain_c", tmp_path, "run"))
+
+
+def test_cmake_and_pkg_config(tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    cmake = require_tool("cmake")
+    installed = tmp_path / "installed"
+    run(cmake, "-S", EXPORT, "-B", tmp_path / "export")
+    run(cmake, "--build", tmp_path / "export")
+    run(require_tool("ctest"), "--test-dir", tmp_path / "export")
+    run(cmake, "--install", tmp_path / "export", "--prefix", installed)
+    run(cmake, "-S", EXAMPLES / "cmake", "-B", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={installed}")
+    run(cmake, "--build", tmp_path / "build")
+    check_controller(run(tmp_path / "build" / "controller"))
+
+    [description] = installed.rglob("springline.pc")
+    search = {"PKG_CONFIG_PATH": str(description.parent)}
+    flags = run(require_tool("pkg-config"), "--cflags", "--libs", "springline", environment=search).split()
+    program = tmp_path / "by_pkg_config"
+    run("cc", EXAMPLES / "plain_c" / "controller.c", *flags, "-o", program)
+    check_controller(run(program))
+
+
+def test_cpp(tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    require_tool("c++")
+    last = make("cpp", tmp_path, "run").splitlines()[-1]
+    time, lift, rotation = numbers(last)
+    assert time == 1.0
+    assert abs(lift) < 1e-3
+    assert abs(rotation - 2.0) < 1e-3
+
+
+def test_two_rates_in_two_threads(tmp_path: Path) -> None:
+    printed = make("two_rate", tmp_path, "run")
+    assert re.search(r"0 faults; references planned at 50 Hz", printed)
+
+
+def test_cffi(tmp_path: Path) -> None:
+    pytest.importorskip("cffi", reason="cffi is not installed: pip install 'springline[dev]'")
+    printed = run(sys.executable, EXAMPLES / "cffi" / "control.py", EXPORT, tmp_path)
+    assert "a failed sensor: a measurement is not a finite number" in printed
+    assert max(map(abs, numbers(printed.splitlines()[-2])[1:])) < 1e-3
+
+
+def test_casadi_external(tmp_path: Path) -> None:
+    printed = run(sys.executable, EXAMPLES / "casadi_external" / "plant.py", EXPORT, tmp_path)
+    assert "springline_plant:(b[3],db[3],ddb[3],x[8],u[2])->(dx[8]) External" in printed
+    frequencies = json.loads(printed.splitlines()[-1].split(": ")[1])
+    assert frequencies == pytest.approx([1036.5, 1414.7], abs=0.2)  # sqrt of the eigenvalues of (M1^-1 + M2^-1) K
+
+
+def test_firmware(tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    """Cortex-M7 in double and Cortex-M4F in single precision: this machine's bits, and the cost that is promised."""
+    hint = "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
+    require_tool("arm-none-eabi-gcc", hint)
+    require_tool("qemu-system-arm", hint)
+    scenario = load_scenario("paper/nominal")
+    single = tmp_path / "single"
+    write_tree(single, *generate_files(scenario.structure(), scenario.values(), real="float"))
+    report = make("cortex_m", tmp_path / "build", "firmware", f"FLOAT={single}")
+    m7, m4f = report.split("Cortex-M4F")
+    for board in (m7, m4f):
+        assert "1000 control steps and 200 plant steps: all bits as expected" in board
+        assert "output as on this machine, bit for bit" in board
+    instructions, stack = (int(x) for x in re.findall(r"control step +mean.*most +(\d+) .*stack +(\d+)", m7)[0])
+    flash, data = (int(x) for x in re.findall(r"\.text (\d+)  \.data (\d+)", m7)[0])
+    assert instructions <= 2500
+    assert stack < 512
+    assert flash < 16 * 1024
+    assert data == 0
