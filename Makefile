@@ -3,16 +3,17 @@
 
 PYTHON  ?= python3
 WORKERS ?= 2
+EXTRAS  ?= dev
 OUT     ?= reproduction
 
 BIN    := .venv/bin
 # Byte code is left to the first import, which halves the time of the installation. The warnings silenced
 # here are setuptools' about our editable mode.
 PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-build-isolation
-SHIPPED = $(shell find model codegen runner generated -type f -not -name '*.pyc' | LC_ALL=C sort)
+SHIPPED = $(shell find model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format bench clean FORCE
+.PHONY: help install reproduce test test-full lint format math-accuracy firmware bench clean FORCE
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
@@ -38,6 +39,12 @@ format: .venv/installed ## let ruff put the code in order
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
+math-accuracy: .venv/installed ## measure the elementary functions against mpmath; writes the table in docs/math.md
+	$(BIN)/python -m benchmarks.math_accuracy --write
+
+firmware: .venv/installed ## the controller on two microcontrollers under emulation: bits, instructions, stack, flash
+	$(MAKE) -C examples/cortex_m firmware SPRINGLINE=$(abspath $(BIN))/springline
+
 bench: .venv/installed ## side by side with what one would use instead
 	$(PIP) --editable '.[bench]'
 	$(BIN)/springline bench
@@ -52,7 +59,7 @@ clean: ## remove what the other verbs made; results in OUT stay
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "springline needs Python 3.11 or later: make PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv
 	$(PIP) --upgrade pip 'setuptools>=77'
-	$(PIP) --editable '.[dev]'
+	$(PIP) --editable '.[$(EXTRAS)]'
 	@touch $@
 
 .venv/files: .venv/dependencies FORCE

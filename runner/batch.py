@@ -8,6 +8,7 @@ the sweep.
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import platform
 import signal
@@ -164,7 +165,9 @@ def _client(scheduler: str, stack: contextlib.ExitStack) -> Any:
             raise InputError(Problem("--scheduler", "", "expected local:N with N >= 1 worker processes", scheduler))
         with _ignoring_interrupts():
             address: Any = stack.enter_context(
-                distributed.LocalCluster(n_workers=int(count), threads_per_worker=1, dashboard_address=None)
+                distributed.LocalCluster(
+                    n_workers=int(count), threads_per_worker=1, dashboard_address=None, silence_logs=logging.ERROR
+                )
             )
     elif "://" in scheduler:
         address = scheduler

@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 from springline.codegen.manifest import FolderConflict
 from springline.codegen.toolchain import ToolchainError
-from springline.runner.commands import batch, doctor, fmu, generate, listing, reproduce, run
+from springline.runner.commands import batch, bench, doctor, fmu, generate, listing, reproduce, run
 from springline.runner.errors import InputError
 from springline.runner.terminal import complain, say, version
 
@@ -61,6 +61,7 @@ export.command("fmu2")(fmu.export_fmu2)
 export.command("fmu3")(fmu.export_fmu3)
 app.add_typer(export, name="export")
 app.command("reproduce")(reproduce.reproduce)
+app.command("bench")(bench.bench)
 app.command("list")(listing.list_)
 app.command("doctor")(doctor.doctor)
 

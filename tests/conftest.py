@@ -38,3 +38,11 @@ def require_tool() -> Callable[..., str]:
         pytest.skip(reason)
 
     return require
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """In CI a skipped test is a gap in what was checked, whoever skipped it."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if os.environ.get("CI") == "true" and reporter is not None and reporter.stats.get("skipped"):
+        reporter.write_line(f"{len(reporter.stats['skipped'])} tests were skipped, and in CI none may be")
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED

@@ -1,7 +1,5 @@
 """`springline batch` and `springline replay`: a sweep into a dataset, and one of its runs again."""
 
-# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
-
 from __future__ import annotations
 
 import math

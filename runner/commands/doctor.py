@@ -1,7 +1,5 @@
 """`springline doctor`: does this machine have what springline needs?"""
 
-# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
-
 from __future__ import annotations
 
 from importlib.metadata import PackageNotFoundError

@@ -1,7 +1,5 @@
 """`springline generate` and `springline export c`: the C of a scenario, ready to be compiled elsewhere."""
 
-# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
-
 from __future__ import annotations
 
 from enum import StrEnum

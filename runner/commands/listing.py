@@ -1,7 +1,5 @@
 """`springline list`: what there is to choose from, with units, defaults and meaning."""
 
-# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
-
 from __future__ import annotations
 
 from enum import StrEnum

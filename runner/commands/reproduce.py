@@ -1,7 +1,5 @@
 """`springline reproduce`: the paper again, number by number."""
 
-# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
-
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`springline run`: one scenario simulated, its tables and figures in a folder."""
 
-# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
-
 from __future__ import annotations
 
 from enum import StrEnum

@@ -8,7 +8,6 @@ from __future__ import annotations
 import ctypes
 import importlib.util
 import json
-import math
 import os
 import re
 import subprocess
@@ -29,7 +28,6 @@ from springline.codegen.fmu import Settings, fmu
 from springline.codegen.fmu_units import base_exponents
 from springline.codegen.kernel import KernelOptions, LoopSettings, Table, kernel
 from springline.codegen.program import Program, program
-from springline.codegen.scalar import literal
 from springline.model.base import COORDINATES
 from springline.model.system import SignalShape, Structure
 
@@ -121,12 +119,11 @@ class Client:
     def step(self, time: float, length: float = PERIOD) -> None:
         self.slave.doStep(currentCommunicationPoint=time, communicationStepSize=length)
 
-    def save(self) -> Any:
-        return self.slave.getFMUState() if not self.two else self.slave.getFMUState()
-
     def names(self, causality: str) -> list[str]:
         return [
-            v.name for v in self.description.modelVariables if v.causality == causality and v.type in ("Real", "Float64")
+            v.name
+            for v in self.description.modelVariables
+            if v.causality == causality and v.type in ("Real", "Float64")
         ]
 
 
@@ -140,9 +137,7 @@ def open_fmu(tmp_path: Path) -> Iterator[Callable[[Path], Client]]:
 
     yield opened
     for client in clients:
-        client.slave.fmi2FreeInstance(client.slave.component) if client.two else client.slave.fmi3FreeInstance(
-            client.slave.component
-        )
+        client.slave.freeInstance()
 
 
 def columns(of: Program) -> list[str]:
@@ -164,9 +159,7 @@ def own_run(
 ) -> NDArray[np.float64]:
     """Our own loop's rows, without t."""
     loop = kernel(of.system.structure, sampled, KernelOptions(width=1, groups=1))
-    settings = LoopSettings(
-        steps=steps, step=STEP, hold=round(PERIOD / STEP), output_every=every, start_time=start
-    )
+    settings = LoopSettings(steps=steps, step=STEP, hold=round(PERIOD / STEP), output_every=every, start_time=start)
     trajectory = loop.run(values[None, :], settings, tables).trajectory
     assert trajectory is not None
     return trajectory[0, :, 1:]
@@ -256,9 +249,7 @@ def test_another_number_is_another_token(shaken: Program, values_of: Values, bui
     fmpy = client_library("fmpy")
     path = build("controller", 3)
     other = path.with_name("other.fmu")
-    other.write_bytes(
-        arm(shaken, values_of(shaken, {"control.k1": 4.0}), "controller", 3, SAMPLED, path.stem)
-    )
+    other.write_bytes(arm(shaken, values_of(shaken, {"control.k1": 4.0}), "controller", 3, SAMPLED, path.stem))
     tokens = {fmpy.read_model_description(str(p)).instantiationToken for p in (path, other)}
     assert len(tokens) == 2
 
@@ -309,22 +300,405 @@ def test_controller_and_plant_are_the_sampled_run(
     build: Build, open_fmu: Callable[[Path], Client], shaken: Program, values_of: Values, version: int
 ) -> None:
     controller, plant = (open_fmu(build(part, version)).start() for part in ("controller", "plant"))
-    measured = [name for name in controller.names("input") if name in plant.names("output")]
-    reference = [name for name in controller.names("input") if name not in measured]
-    commands = plant.names("input")
-    signals = shaken.system.function("signals")
-    values = values_of(shaken)
-    names = [name for name in columns(shaken) if not name.startswith("q1d_")]
+    guide = open_fmu(build("loop", version, CONTINUOUS if version == 2 else SAMPLED)).start()  # for its reference
+    inputs, commands = controller.names("input"), plant.names("input")
+    measured = [name for name in inputs if name in plant.references]
+    reference = [name for name in inputs if name not in measured]
+    assert len(measured) == len(reference) == 3 * shaken.system.n
+    shown = [name for name in columns(shaken) if not name.startswith("q1d_")]
+    sources = [controller if name in controller.names("output") else plant for name in shown]
     rows = []
     for k in range(round(DURATION / PERIOD) + 1):
         if k > 0:
-            for client in (controller, plant):
+            for client in (controller, plant, guide):
                 client.step((k - 1) * PERIOD)
-        controller.set(reference, reference_at(k * PERIOD))
+        controller.set(reference, guide.get(reference))
         controller.set(measured, plant.get(measured))
         plant.set(commands, controller.get(commands))
-        rows.append([(controller if name in controller.names("output") else plant).get([name])[0] for name in names])
-    assert signals is not None and len(reference) == 3 * shaken.system.n
-    expected = own_run(shaken, values, True)
-    kept = [columns(shaken).index(name) for name in names]
+        rows.append([client.get([name])[0] for client, name in zip(sources, shown, strict=True)])
+    expected = own_run(shaken, values_of(shaken), True)
+    kept = [columns(shaken).index(name) for name in shown]
     np.testing.assert_array_equal(np.array(rows), expected[:, kept])
+
+
+def test_sampled_controller_holds_between_samples(build: Build, open_fmu: Callable[[Path], Client]) -> None:
+    client = open_fmu(build("controller", 3)).start()
+    commands = ["U_lift", "U_rotation"]
+
+    def command(q1: float) -> list[float]:
+        client.set(["q1_lift", "q1d_lift"], [q1, 0.3])
+        return client.get(commands)
+
+    first = command(0.1)
+    assert command(0.2) != first  # at a sample the command belongs to its inputs
+    held = command(0.1)
+    client.step(0.0, 0.4 * PERIOD)
+    assert command(0.2) == held
+    client.step(0.4 * PERIOD, 0.6 * PERIOD)
+    sampled = command(0.2)
+    assert sampled != held
+    client.step(PERIOD, 1.5 * PERIOD)  # a sample on the way takes the inputs that are held
+    assert command(0.7) == sampled
+    client.set(["control.mu.0"], [20.0])
+    assert command(0.7) == sampled
+    client.step(2.5 * PERIOD, 0.5 * PERIOD)
+    assert command(0.2) != sampled
+
+
+def test_simulate_fmu_with_another_parameter(build: Build, shaken: Program, values_of: Values) -> None:
+    fmpy = client_library("fmpy")
+    names = columns(shaken)
+    rows = fmpy.simulate_fmu(
+        str(build("loop", 2, CONTINUOUS)),
+        stop_time=DURATION,
+        output_interval=EVERY * STEP,
+        start_values={"control.delta": 0.02, "initial.q.0": 0.7},
+        output=names,
+    )
+    expected = own_run(shaken, values_of(shaken, {"control.delta": 0.02, "initial.q.0": 0.7}), False)
+    np.testing.assert_array_equal(np.column_stack([rows[name] for name in names]), expected)
+
+
+def test_a_tunable_parameter_counts_from_where_it_is_set(build: Build, open_fmu: Callable[[Path], Client]) -> None:
+    tuned, fresh = (open_fmu(build("loop", 3)) for _ in range(2))
+    tuned.start()
+    before = tuned.get(["U_lift"])
+    tuned.set(["control.mu.0"], [20.0])
+    fresh.set(["control.mu.0"], [20.0])
+    fresh.start()
+    assert tuned.get(["U_lift"]) == fresh.get(["U_lift"]) != before
+    np.testing.assert_array_equal(driven(tuned, ["q1_lift"]), driven(fresh, ["q1_lift"]))
+
+
+def test_start_time_and_uneven_communication_steps(
+    build: Build, open_fmu: Callable[[Path], Client], shaken: Program, values_of: Values
+) -> None:
+    names, start = columns(shaken), 0.25
+    client = open_fmu(build("loop", 2, CONTINUOUS)).start(start)
+    expected = own_run(shaken, values_of(shaken), False, start=start)
+    np.testing.assert_array_equal(driven(client, names, start), expected)
+
+    uneven = open_fmu(build("loop", 2, CONTINUOUS)).start(start)
+    times = start + DURATION * np.array([0.0, 0.1001, 0.33333, 0.5, 0.50001, 1.0])
+    for time, after in zip(times, times[1:], strict=False):
+        uneven.step(time, after - time)
+    np.testing.assert_allclose(uneven.get(names[:8]), expected[-1, :8], rtol=0, atol=1e-7)  # RK4 at other steps
+    assert uneven.get(["time"]) == [times[-1]]
+
+
+def test_table_signals(open_fmu: Callable[[Path], Client], values_of: Values, tmp_path: Path) -> None:
+    moved = program(Structure(base_motion=SignalShape("table", (1, 0, 1))))
+    random = np.random.default_rng(474)
+    table = Table(-0.05, 0.0625, True, random.normal(0.0, 0.1, (4, 2, 4)))
+    values = values_of(moved)
+    path = tmp_path / "table.fmu"
+    path.write_bytes(
+        fmu(
+            moved.system.structure,
+            values,
+            SAMPLED,
+            part="loop",
+            version=3,
+            identifier="table",
+            name="t",
+            tables=[table],
+        )
+    )
+    names = columns(moved)
+    client = open_fmu(path).start()
+    np.testing.assert_array_equal(driven(client, names), own_run(moved, values, True, tables=[table]))
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_in_the_container_of_another_tool(
+    build: Build,
+    open_fmu: Callable[[Path], Client],
+    shaken: Program,
+    values_of: Values,
+    tmp_path: Path,
+    version: int,
+) -> None:
+    client_library("fmu_manipulation_toolbox")
+    settings = CONTINUOUS if version == 2 else SAMPLED
+    path = build("loop", version, settings)
+    plan = {"name": "box.fmu", "fmu": [path.name], "auto_output": True, "step_size": EVERY * STEP}
+    (tmp_path / "box.json").write_text(json.dumps(plan))
+    (tmp_path / path.name).write_bytes(path.read_bytes())
+    call = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
+    arguments = ["-fmu-directory", ".", "-container", "box.json", "-fmi", str(version)]
+    subprocess.run([sys.executable, "-c", call, *arguments], check=True, cwd=tmp_path, capture_output=True)
+    names = columns(shaken)
+    rows = driven(open_fmu(tmp_path / "box.fmu").start(stop=DURATION), names)
+    np.testing.assert_array_equal(rows, own_run(shaken, values_of(shaken), settings is SAMPLED))
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_built_from_its_own_sources(
+    build: Build,
+    open_fmu: Callable[[Path], Client],
+    shaken: Program,
+    values_of: Values,
+    tmp_path: Path,
+    require_tool: Callable[..., str],
+    version: int,
+) -> None:
+    require_tool("cmake")
+    fmpy = client_library("fmpy")
+    settings = CONTINUOUS if version == 2 else SAMPLED
+    path = build("loop", version, settings)
+    folder = tmp_path / path.stem  # where open_fmu looks before it unzips
+    fmpy.extract(str(path), unzipdir=str(folder))
+    (shipped,) = (folder / "binaries").rglob("*.*")
+    before = shipped.read_bytes()
+    shipped.unlink()
+    client_library("fmpy.build").build_platform_binary(folder, configuration="Release")
+    assert shipped.read_bytes() != before  # other flags, same results
+    client = open_fmu(path).start()
+    np.testing.assert_array_equal(
+        driven(client, columns(shaken)), own_run(shaken, values_of(shaken), settings is SAMPLED)
+    )
+
+
+# --- life of an instance ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_state_is_saved_restored_and_serialised(build: Build, open_fmu: Callable[[Path], Client], version: int) -> None:
+    path = build("loop", version, CONTINUOUS if version == 2 else SAMPLED)
+    client = open_fmu(path).start()
+    outputs = client.names("output")
+    client.step(0.0, 7 * STEP)  # between two samples
+    state = client.slave.getFMUState()
+    data = client.slave.serializeFMUState(state)
+
+    def onwards(of: Client) -> list[list[float]]:
+        rows = []
+        for k in range(5):
+            of.step((7 + 9 * k) * STEP, 9 * STEP)
+            rows.append(of.get(outputs))
+        return rows
+
+    first = onwards(client)
+    client.set(["control.delta"], [0.5])
+    client.slave.setFMUState(state)
+    assert client.get(["control.delta"]) == [0.05]
+    assert onwards(client) == first
+    other = open_fmu(path)  # another instance, never initialised
+    foreign = other.slave.deserializeFMUState(data)
+    other.slave.setFMUState(foreign)
+    assert other.get(["time"]) == [7 * STEP]
+    assert onwards(other) == first
+    assert other.slave.serializeFMUState(foreign) == data
+    spoilt = bytearray(data)
+    spoilt[100] ^= 1
+    for bad in (bytes(spoilt), data[:-1], b""):
+        with pytest.raises(Exception, match=r"[Dd]e[sS]erialize"):
+            other.slave.deserializeFMUState(bad)
+    for instance, kept in ((client, state), (other, foreign)):
+        instance.slave.freeFMUState(kept)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_instances_are_independent_and_reset(build: Build, open_fmu: Callable[[Path], Client], version: int) -> None:
+    path = build("loop", version, CONTINUOUS if version == 2 else SAMPLED)
+    alone = driven(open_fmu(path).start(), ["q1_lift", "U_lift"])
+    one, other = open_fmu(path), open_fmu(path)
+    other.set(["control.mu.0", "initial.q.0"], [30.0, 0.2])
+    one.start(), other.start()
+    rows = [one.get(["q1_lift", "U_lift"])]
+    for k in range(round(DURATION / STEP) // EVERY):
+        for client in (other, one):
+            client.step(k * EVERY * STEP)
+        rows.append(one.get(["q1_lift", "U_lift"]))
+    np.testing.assert_array_equal(np.array(rows), alone)
+    other.slave.reset()
+    assert other.get(["control.mu.0", "initial.q.0", "time"]) == [12.0, 0.8, 0.0]
+    np.testing.assert_array_equal(driven(other.start(), ["q1_lift", "U_lift"]), alone)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_ten_thousand_instances_leave_nothing_behind(
+    build: Build, open_fmu: Callable[[Path], Client], version: int
+) -> None:
+    statm = Path("/proc/self/statm")
+    if not statm.exists():
+        pytest.skip("the resident set is read from /proc, which only Linux has")
+    slave = open_fmu(build("controller", version)).slave
+    if version == 2:
+        make = (b"x", 1, slave.guid.encode(), None, ctypes.byref(slave.callbacks), 0, 0)
+        instantiate, free = slave.dll.fmi2Instantiate, slave.dll.fmi2FreeInstance
+        get, drop = slave.dll.fmi2GetFMUstate, slave.dll.fmi2FreeFMUstate
+    else:
+        make = (
+            b"x",
+            slave.guid.encode(),
+            None,
+            *[False] * 4,
+            None,
+            0,
+            None,
+            slave.logMessage,
+            slave.intermediateUpdate,
+        )
+        instantiate, free = slave.dll.fmi3InstantiateCoSimulation, slave.dll.fmi3FreeInstance
+        get, drop = slave.dll.fmi3GetFMUState, slave.dll.fmi3FreeFMUState
+    instantiate.restype = ctypes.c_void_p
+
+    def cycle() -> None:
+        instance, state = ctypes.c_void_p(instantiate(*make)), ctypes.c_void_p()
+        assert instance
+        assert get(instance, ctypes.byref(state)) == 0 == drop(instance, ctypes.byref(state))
+        free(instance)
+
+    def resident() -> int:
+        return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    for _ in range(500):
+        cycle()
+    before = resident()
+    for _ in range(10_000):
+        cycle()
+    assert resident() - before < 200_000  # an instance has some 1,000 bytes: a leak would be 10 MB
+
+
+# --- what goes wrong -------------------------------------------------------------------------------------
+
+
+def refused(client: Client, action: Callable[[], object], text: str) -> None:
+    """The action is an FMI error, and its message says `text`."""
+    before = len(client.messages)
+    with pytest.raises(Exception, match="fmi"):
+        action()
+    assert len(client.messages) == before + 1, client.messages
+    assert text in client.messages[-1]
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_wrong_values_are_refused_and_change_nothing(
+    build: Build, open_fmu: Callable[[Path], Client], version: int
+) -> None:
+    client = open_fmu(build("controller", version)).start()
+    inputs = client.names("input")
+    client.set(inputs, [0.1] * len(inputs))
+    before = client.get(list(client.names("output")))
+    nan, inf = float("nan"), float("inf")
+    for name, value, expected in (
+        ("control.delta", -1.0, "control.delta is -1, expected a number >= 0"),
+        ("control.alpha", 1.0, "expected a number in (0, 1)"),
+        ("control.nu", 3.0, "expected a positive even integer"),
+        ("control.mu.0", 0.0, "expected a number > 0"),
+        ("control.k1", inf, "expected a number > 0"),
+        ("control.U_max.0", -inf, "expected a number > 0 (inf means no limit)"),
+        ("control.U_max.0", nan, "control.U_max.0 is"),
+        ("q1_lift", nan, "q1_lift is"),
+        ("q1d_rotation", inf, "q1d_rotation is inf, expected a finite number"),
+        ("U_lift", 1.0, "U_lift is neither a parameter nor an input"),
+        ("time", 1.0, "time is neither a parameter nor an input"),
+    ):
+        refused(client, lambda name=name, value=value: client.set([name], [value]), expected)
+    assert client.get(client.names("output")) == before
+    client.set(["control.U_max.0"], [inf])
+    client.references["nobody"] = 9999
+    client.references["flag"] = client.references["saturated_lift"]
+    refused(client, lambda: client.get(["nobody"]), "there is no value reference 9999")
+    refused(client, lambda: client.set(["nobody"], [0.0]), "there is no value reference 9999")
+    refused(client, lambda: client.get(["flag"]), "saturated_lift is of another type")
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_steps_that_cannot_be(build: Build, open_fmu: Callable[[Path], Client], version: int) -> None:
+    client = open_fmu(build("plant", version))
+    refused(client, lambda: client.step(0.0), "may not be called before initialization")
+    client.start(stop=1.0)
+    refused(client, lambda: client.set(["initial.q.0"], [0.1]), "initial.q.0 is fixed after initialization")
+    for time, length, text in (
+        (0.0, 0.0, "impossible"),
+        (0.0, -PERIOD, "impossible"),
+        (0.0, float("nan"), "impossible"),
+        (0.0, 1e308, "stops at 1 s"),
+        (0.5, PERIOD, "the instance is at 0 s"),
+    ):
+        refused(client, lambda time=time, length=length: client.step(time, length), text)
+    client.step(0.0)
+    client.set(["U_lift"], [1e300])
+    refused(client, lambda: client.step(PERIOD), "the plant left the finite numbers")
+    refused(client, lambda: client.step(PERIOD), "may not be called after an error")
+    assert all(np.isfinite(client.get(client.names("output"))))
+    client.slave.reset()
+    client.start().step(0.0)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_null_pointers_and_foreign_tokens(build: Build, open_fmu: Callable[[Path], Client], version: int) -> None:
+    """Called as C may call it: with nothing where something is expected. Errors, never a crash."""
+    client = open_fmu(build("plant", version))
+    dll = client.slave.dll
+    for name in sorted(declared(version)):
+        function = dll[name]
+        if name.endswith(("GetVersion", "GetTypesPlatform")):
+            continue
+        arguments = [ctypes.c_void_p()] * 14
+        function.restype = ctypes.c_void_p if "Instantiate" in name else ctypes.c_int
+        assert function(*arguments) in (None, 2, 3, 0 if name.endswith("FreeInstance") else 3) or "Free" in name, name
+    instance = ctypes.c_void_p(client.slave.component)
+    reference = (ctypes.c_uint * 1)(0)
+    get = dll[f"fmi{version}GetReal" if version == 2 else "fmi3GetFloat64"]
+    size = ctypes.c_size_t(1)
+    assert get(instance, None, size, None, size) == 3
+    assert get(instance, reference, size, None, size) == 3
+    assert get(instance, None, ctypes.c_size_t(0), None, ctypes.c_size_t(0)) == 0
+    assert len(client.messages) == 2
+    token = client.slave.guid
+    client.slave.guid = "{another}"
+    with pytest.raises(Exception, match="instantiate"):
+        if version == 2:
+            client.slave.instantiate(callbacks=client.slave.callbacks)
+        else:
+            client.slave.instantiate(logMessage=client.slave.logMessage)
+    client.slave.guid, client.slave.component = token, instance.value
+    assert "the token is {another}" in client.messages[-1]
+
+
+def test_prefixed_functions_link_into_one_program(
+    build: Build, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    """Two FMUs of two versions in one C program, as the standards' prefix rules have it."""
+    compiler = toolchain.find_compiler().argv
+    objects = []
+    for part, version in (("controller", 2), ("plant", 3)):
+        path = build(part, version)
+        folder = tmp_path / path.stem
+        with zipfile.ZipFile(path) as archive:
+            archive.extractall(folder)
+        objects.append(str(tmp_path / f"{path.stem}.o"))
+        prefix = f"-DFMI{version}_FUNCTION_PREFIX={path.stem}_"
+        source = str(folder / "sources" / "all.c")
+        subprocess.run([*compiler, "-std=c99", "-O0", prefix, "-c", source, "-o", objects[-1]], check=True)
+    main = tmp_path / "main.c"
+    main.write_text(
+        "#include <stdio.h>\n"
+        "const char *controller_sampled_fmi2_fmi2GetVersion(void);\n"
+        "const char *plant_sampled_fmi3_fmi3GetVersion(void);\n"
+        "int main(void) {\n"
+        '  printf("%s %s", controller_sampled_fmi2_fmi2GetVersion(), plant_sampled_fmi3_fmi3GetVersion());\n'
+        "  return 0;\n}\n"
+    )
+    subprocess.run([*compiler, str(main), *objects, "-o", str(tmp_path / "both")], check=True)
+    assert subprocess.run([tmp_path / "both"], check=True, capture_output=True, text=True).stdout == "2.0 3.0"
+
+
+def test_unusable_arguments(shaken: Program, values_of: Values) -> None:
+    values = values_of(shaken)
+    with pytest.raises(ValueError, match="no C identifier"):
+        arm(shaken, values, "plant", 3, SAMPLED, "two words")
+    with pytest.raises(ValueError, match="1 tables given, the system has 0"):
+        fmu(
+            shaken.system.structure,
+            values,
+            SAMPLED,
+            part="plant",
+            version=3,
+            identifier="a",
+            name="a",
+            tables=[Table(0.0, 1.0, False, np.zeros((1, 1, 4)))],
+        )
