@@ -14,7 +14,7 @@ from springline.codegen.fmu_settings import FmiVersion, Settings
 from springline.codegen.fmu_variables import Interface, Variable, base_is_input
 from springline.codegen.kernel import Table
 from springline.codegen.scalar import literal
-from springline.codegen.typed import TypedInterface
+from springline.codegen.typed import TypedInterface, literal_constant
 
 _HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
@@ -84,7 +84,6 @@ def _model(
     grid = settings.step if part != "controller" else settings.period
     hold = round(settings.period / settings.step)
     lines = [
-        "#include <math.h>",
         "#include <stdint.h>",
         "",
         f'#include "{export.prefix}.h"',
@@ -93,7 +92,14 @@ def _model(
         "",
         f"#define FMU_GRID {literal(grid, 'double')} /* s, "
         + ("step of the integrator */" if part != "controller" else "sample period; 0: at every time */"),
-        f"#define FMU_BOUND {_constant(settings.bound)} /* the plant may not leave it, SI */",
+        f"#define FMU_BOUND {literal_constant(settings.bound, 'double')} /* the plant may not leave it, SI */",
+        *(
+            f"#define {name} {literal_constant(time if part != 'controller' else anytime, 'double')} /* s */"
+            for name, time, anytime in (
+                ("FMU_SINCE", settings.since, -math.inf),
+                ("FMU_UNTIL", settings.until, math.inf),
+            )
+        ),
         f"#define FMU_HOLD {hold} /* steps per sample of the control, 0: continuous */",
         f"#define FMU_BASE_IS_INPUT {int(base_is_input(system, part))}",
         "",
@@ -112,7 +118,7 @@ def _model(
         "  const char *name;",
         "  int causality;",
         "  int boolean, fixed;",
-        "  double start, low, high; /* HUGE_VAL: no limit */",
+        "  double start, low, high;",
         "  int low_open, high_open, even, infinite;",
         "  const char *expected;",
         "} fmu_variable;",
@@ -127,18 +133,13 @@ def _model(
     return "\n".join([*lines, *copies, *_tables(tables)])
 
 
-def _constant(value: float) -> str:
-    if math.isinf(value):
-        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
-    return literal(value, "double")
-
-
 def _row(variable: Variable) -> str:
     bounds = variable.bounds
+    numbers = (literal_constant(x, "double") for x in (variable.start or 0.0, bounds.low, bounds.high))
     flags = (bounds.low_open, bounds.high_open, bounds.even, bounds.infinite)
     return (
         f'{{"{variable.name}", FMU_{variable.causality.upper()}, {int(variable.boolean)}, {int(variable.fixed)}, '
-        f"{_constant(variable.start or 0.0)}, {_constant(bounds.low)}, {_constant(bounds.high)}, "
+        f"{', '.join(numbers)}, "
         f'{", ".join(str(int(flag)) for flag in flags)}, "{bounds}"}}'
     )
 

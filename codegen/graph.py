@@ -71,46 +71,22 @@ _EXACT: dict[int, Callable[..., float]] = {
 }
 
 
-class Graph:
-    """Value-numbered nodes; `outputs[function][k]` are the nodes of a Function's k-th output, entry by entry.
+class ValueGraph:
+    """Value-numbered nodes; `outputs[function][k]` are the nodes of a Function's k-th output, entry by entry."""
 
-    baked  slot key -> value for the parameters that are constants; all others are tunable
-    """
-
-    def __init__(self, program: Program, baked: Mapping[str, float]) -> None:
+    def __init__(self) -> None:
         self.nodes: list[Node] = []
         self.outputs: dict[str, list[list[int]]] = {}
         self._index: dict[object, int] = {}
-        self.tunable = tuple(slot.key for slot in program.system.slots if slot.key not in baked)
-        columns = {key: i for i, key in enumerate(self.tunable)}
-        self._slot_of_column = [i for i, slot in enumerate(program.system.slots) if slot.key in columns]
-        p = [
-            self.constant(baked[slot.key])
-            if slot.key in baked
-            else self._leaf("p", columns[slot.key], Binding.RUN, True)
-            for slot in program.system.slots
-        ]
-        t = [self._leaf("t", 0, Binding.UNIFORM)]
-        d = [self._leaf("d", i, Binding.UNIFORM) for i in range(program.size("d"))]
-        x = [self._leaf("x", i, Binding.STATE) for i in range(program.size("x"))]
-        u = [self._leaf("u", i, Binding.STATE) for i in range(program.size("u"))]
-        functions = program.functions
-        [r] = self.add("run", functions["run"], [p])
-        self.add("start", functions["start"], [p, r])
-        [w] = self.add("signals", functions["signals"], [t, d, p, r])
-        [s] = self.add("time", functions["time"], [w, p, r])
-        self.add("error", functions["error"], [w, s, x, p, r])
-        [command, _, _] = self.add("control", functions["control"], [w, s, x, p, r])
-        self.add("plant", functions["plant"], [w, s, x, u, p, r])
-        self.add("closed", functions["plant"], [w, s, x, command, p, r])
+
+    def leaf(self, name: str, index: int, binding: Binding, *, varies: bool = False) -> int:
+        """The node of entry `index` of an input."""
+        return self._intern((name, index), Node(None, (), binding, varies, source=(name, index)))
 
     def constant(self, value: float) -> int:
         """The node of a constant; 0.0 and -0.0 are two."""
         key = ("constant", value, math.copysign(1.0, value))
         return self._intern(key, Node(None, (), Binding.CONSTANT, value=float(value), source=("constant", 0)))
-
-    def _leaf(self, name: str, index: int, binding: Binding, varies: bool = False) -> int:
-        return self._intern((name, index), Node(None, (), binding, varies, source=(name, index)))
 
     def _intern(self, key: object, node: Node) -> int:
         if key not in self._index:
@@ -152,22 +128,6 @@ class Graph:
         self.outputs[name] = results
         return results
 
-    def value_at(self, i: int, parameters: Sequence[float]) -> float | None:
-        """Value of a run-time node at given slots' values where exact operations lead there, else None."""
-        node = self.nodes[i]
-        if node.binding is Binding.CONSTANT:
-            return node.value
-        if node.op is None:
-            return parameters[self._slot_of_column[node.source[1]]] if node.source[0] == "p" else None
-        arguments = [self.value_at(a, parameters) for a in node.arguments]
-        known = [a for a in arguments if a is not None]
-        if node.op not in _EXACT or len(known) < len(arguments):
-            return None
-        try:
-            return _EXACT[node.op](*known)
-        except (ZeroDivisionError, ValueError):
-            return None
-
     def needed(self, wanted: Sequence[int], binding: Binding) -> list[int]:
         """Nodes that a function of this binding time has to compute for `wanted`."""
         found: set[int] = set()
@@ -187,3 +147,52 @@ class Graph:
         if binding is Binding.UNIFORM and node.binding is Binding.RUN and not node.varies:
             return True  # shared by all runs, and cheap next to carrying it there
         return node.binding is binding
+
+
+class LoopGraph(ValueGraph):
+    """The graph of a Program's loop: signals feed the control, the control feeds the plant.
+
+    baked    slot key -> value for the parameters that are constants; all others are tunable
+    tunable  their keys, in the order of their leaves ("p", k)
+    """
+
+    def __init__(self, program: Program, baked: Mapping[str, float]) -> None:
+        super().__init__()
+        self.tunable = tuple(slot.key for slot in program.system.slots if slot.key not in baked)
+        columns = {key: i for i, key in enumerate(self.tunable)}
+        self._slot_of_column = [i for i, slot in enumerate(program.system.slots) if slot.key in columns]
+        p = [
+            self.constant(baked[slot.key])
+            if slot.key in baked
+            else self.leaf("p", columns[slot.key], Binding.RUN, varies=True)
+            for slot in program.system.slots
+        ]
+        t = [self.leaf("t", 0, Binding.UNIFORM)]
+        d = [self.leaf("d", i, Binding.UNIFORM) for i in range(program.size("d"))]
+        x = [self.leaf("x", i, Binding.STATE) for i in range(program.size("x"))]
+        u = [self.leaf("u", i, Binding.STATE) for i in range(program.size("u"))]
+        functions = program.functions
+        [r] = self.add("run", functions["run"], [p])
+        self.add("start", functions["start"], [p, r])
+        [w] = self.add("signals", functions["signals"], [t, d, p, r])
+        [s] = self.add("time", functions["time"], [w, p, r])
+        self.add("error", functions["error"], [w, s, x, p, r])
+        [command, _, _] = self.add("control", functions["control"], [w, s, x, p, r])
+        self.add("plant", functions["plant"], [w, s, x, u, p, r])
+        self.add("closed", functions["plant"], [w, s, x, command, p, r])
+
+    def value_at(self, i: int, parameters: Sequence[float]) -> float | None:
+        """Value of a run-time node at given slots' values where exact operations lead there, else None."""
+        node = self.nodes[i]
+        if node.binding is Binding.CONSTANT:
+            return node.value
+        if node.op is None:
+            return parameters[self._slot_of_column[node.source[1]]] if node.source[0] == "p" else None
+        arguments = [self.value_at(a, parameters) for a in node.arguments]
+        known = [a for a in arguments if a is not None]
+        if node.op not in _EXACT or len(known) < len(arguments):
+            return None
+        try:
+            return _EXACT[node.op](*known)
+        except (ZeroDivisionError, ValueError):
+            return None

@@ -126,8 +126,8 @@ def _flags(options: KernelOptions) -> tuple[str, ...]:
     if wanted is None:
         compiler = options.compiler or toolchain.find_compiler()
         wanted = ("-O3", *toolchain.native_flags(compiler))
-        if compiler.family == "gcc":  # its scheduler before register allocation is what hides the latencies
-            wanted += ("-fschedule-insns", "-fsched-pressure")
+        if compiler.family == "gcc":  # its scheduler before register allocation hides the latencies
+            wanted += ("-fschedule-insns", "-fsched-pressure", "-mtune=generic")
     return (*wanted, "-std=gnu99", "-fvisibility=hidden", "-Wno-unused-parameter", "-Wno-psabi")
 
 

@@ -17,49 +17,10 @@ from functools import partial
 
 import casadi as ca
 
-from springline.codegen.graph import Binding, Graph
+from springline.codegen.graph import Binding, LoopGraph
+from springline.codegen.operations import MASKS, POWERS, SPECIAL_POWERS, formula, print_operation
 from springline.codegen.program import Program
 from springline.model.base import COORDINATES
-
-_VECTOR_CALLS = {
-    ca.OP_SQRT: "sqrt",
-    ca.OP_EXP: "exp",
-    ca.OP_LOG: "log",
-    ca.OP_LOG1P: "log1p",
-    ca.OP_EXPM1: "expm1",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_TAN: "tan",
-    ca.OP_POW: "pow",
-    ca.OP_CONSTPOW: "pow",
-    ca.OP_FABS: "fabs",
-    ca.OP_SIGN: "sign",
-    ca.OP_FMIN: "fmin",
-    ca.OP_FMAX: "fmax",
-    ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil",
-    ca.OP_COPYSIGN: "copysign",
-    ca.OP_HYPOT: "hypot",
-}
-_INFIX = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
-_COMPARISONS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
-_LOGIC = {ca.OP_AND: "&", ca.OP_OR: "|"}
-_MASKS = frozenset({*_COMPARISONS, *_LOGIC, ca.OP_NOT})
-
-# Exponents for which sl_pow is defined as a kernel of its own (sl_math.h); the nearest double where it is a third.
-SPECIAL_POWERS = {
-    1 / 3: "p1_3",
-    -1 / 3: "m1_3",
-    2 / 3: "p2_3",
-    -2 / 3: "m2_3",
-    0.5: "p1_2",
-    -0.5: "m1_2",
-    1.5: "p3_2",
-    1.0: "p1",
-    -1.0: "m1",
-    2.0: "p2",
-    3.0: "p3",
-}
 
 # Rough latencies in cycles: they only decide the order of statements.
 _LATENCY = {
@@ -85,17 +46,11 @@ _FAST = frozenset({
     *(f"pow_{power}" for power in ("p1_3", "m1_3", "p2_3", "m2_3", "p1_2", "m1_2", "p3_2")),
 })  # fmt: skip
 
-_NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
-
 
 _FORMULA_DEPTH = 4
 
 Load = Callable[[int, str], str]
 Store = Callable[[int, str, str], str]
-
-
-class UnprintableOperation(ValueError):
-    """A Function holds an operation that has no C in sl_math.h."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +82,7 @@ def literal(value: float) -> str:
 class _Emitter:
     def __init__(self, program: Program, baked: Mapping[str, float], groups: int) -> None:
         self.program = program
-        self.graph = Graph(program, baked)
+        self.graph = LoopGraph(program, baked)
         self.groups = groups
         self.speculate = not baked
         self.defaults = [slot.default for slot in program.system.slots]
@@ -242,9 +197,7 @@ class _Emitter:
         if node.op is None or (depth and (i in self.names or depth > _FORMULA_DEPTH)):
             return self.names.get(i, "...")
         parts = [self._formula(a, depth + 1) for a in node.arguments]
-        if node.op in _INFIX:
-            return f"({parts[0]} {_INFIX[node.op]} {parts[1]})"
-        return f"{_NAMES[node.op].removeprefix('OP_').lower()}({', '.join(parts)})"
+        return formula(node.op, parts)
 
     def _assumed_power(self, exponent: int) -> float | None:
         """The special exponent that a run-time exponent has at the parameters' default values, if it has one."""
@@ -261,37 +214,23 @@ class _Emitter:
     def _expression(self, i: int, ref: Callable[[int], str], mask: Callable[[int], str], ok: str | None) -> str:
         """C expression of an operation; with `ok`, fast paths that clear it in the lanes where they do not hold."""
         node = self.graph.nodes[i]
-        op, arguments = node.op, node.arguments
-        assert op is not None
-        if op in _INFIX:
-            return f"{ref(arguments[0])} {_INFIX[op]} {ref(arguments[1])}"
-        if op == ca.OP_NEG:
-            return f"-{ref(arguments[0])}"
-        if op == ca.OP_SQ:
-            return f"{ref(arguments[0])} * {ref(arguments[0])}"
-        if op == ca.OP_TWICE:
-            return f"slv_set(2.0) * {ref(arguments[0])}"
-        if op == ca.OP_INV:
-            return f"slv_set(1.0) / {ref(arguments[0])}"
-        if op in (ca.OP_POW, ca.OP_CONSTPOW):
-            exponent: float | None = self.graph.nodes[arguments[1]].value
+        assert node.op is not None
+        exponent: float | None = None
+        if node.op in POWERS:
+            power = self.graph.nodes[node.arguments[1]]
+            exponent = power.value if power.binding is Binding.CONSTANT else None
             if ok is not None and exponent not in SPECIAL_POWERS:
-                exponent = self._assumed_power(arguments[1])
-            if exponent in SPECIAL_POWERS:
-                return self._call(f"pow_{SPECIAL_POWERS[exponent]}", [ref(arguments[0])], ok)
-        if op in _VECTOR_CALLS:
-            return self._call(_VECTOR_CALLS[op], [ref(a) for a in arguments], ok)
-        if op in _COMPARISONS:
-            return f"{ref(arguments[0])} {_COMPARISONS[op]} {ref(arguments[1])}"
-        if op in _LOGIC:
-            return f"{mask(arguments[0])} {_LOGIC[op]} {mask(arguments[1])}"
-        if op == ca.OP_NOT:
-            return f"slv_not({mask(arguments[0])})"
-        if op == ca.OP_IF_ELSE_ZERO:
-            return f"slv_if({mask(arguments[0])}, {ref(arguments[1])})"
-        raise UnprintableOperation(
-            f"the lane emitter cannot print the operation {_NAMES.get(op, op)} of the Function {node.origin!r}: "
-            "sl_math.h has no function for it"
+                exponent = self._assumed_power(node.arguments[1])
+        return print_operation(
+            node.op,
+            node.arguments,
+            library="slv",
+            value=ref,
+            truth=mask,
+            constant=lambda number: f"slv_set({literal(number)})",
+            exponent=exponent,
+            call=lambda name, operands: self._call(name, operands, ok),
+            origin=node.origin,
         )
 
     def _body(
@@ -324,10 +263,10 @@ class _Emitter:
             if node.binding is Binding.CONSTANT:
                 return f"slv_set({literal(node.value)})"
             label = self._label(i, suffix)
-            return f"slv_true({label})" if node.op in _MASKS and i in computed else label
+            return f"slv_true({label})" if node.op in MASKS and i in computed else label
 
         def mask(i: int, suffix: str) -> str:
-            if nodes[i].op in _MASKS and i in computed:
+            if nodes[i].op in MASKS and i in computed:
                 return self._label(i, suffix)
             return f"({reference(i, suffix)} != slv_set(0.0))"
 
@@ -362,7 +301,7 @@ class _Emitter:
                     lines.append(f"{indent}{call};")
                 present.update(pair)
                 continue
-            if fast and op in (ca.OP_POW, ca.OP_CONSTPOW):
+            if fast and op in POWERS:
                 assumed = self._assumed_power(arguments[1])
                 if assumed is not None and arguments[1] not in tested:
                     tested.add(arguments[1])
@@ -370,7 +309,7 @@ class _Emitter:
                         f"{indent}ok{s} = ok{s} & ({reference(arguments[1], s)} == slv_set({literal(assumed)}));"
                         for s in suffixes
                     )
-            kind = "sl_m" if op in _MASKS else "sl_v"
+            kind = "sl_m" if op in MASKS else "sl_v"
             for s in suffixes:
                 ok = f"ok{s}" if fast else None
                 expression = self._expression(i, partial(reference, suffix=s), partial(mask, suffix=s), ok)

@@ -16,35 +16,9 @@ import casadi as ca
 import numpy as np
 
 from springline.codegen.export import Export, Real, port_entries
-from springline.codegen.graph import Binding, Graph
-from springline.codegen.lanes import SPECIAL_POWERS, UnprintableOperation
+from springline.codegen.graph import Binding, ValueGraph
+from springline.codegen.operations import MASKS, POWERS, print_operation
 from springline.model.sliding import LARGEST_EXPONENT, TINY
-
-_INFIX = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
-_COMPARISONS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
-_LOGIC = {ca.OP_AND: "&", ca.OP_OR: "|"}
-_MASKS = frozenset({*_COMPARISONS, *_LOGIC, ca.OP_NOT})
-_CALLS = {
-    ca.OP_SQRT: "sqrt",
-    ca.OP_EXP: "exp",
-    ca.OP_EXPM1: "expm1",
-    ca.OP_LOG: "log",
-    ca.OP_LOG1P: "log1p",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_TAN: "tan",
-    ca.OP_POW: "pow",
-    ca.OP_CONSTPOW: "pow",
-    ca.OP_HYPOT: "hypot",
-    ca.OP_FABS: "fabs",
-    ca.OP_SIGN: "sign",
-    ca.OP_FMIN: "fmin",
-    ca.OP_FMAX: "fmax",
-    ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil",
-    ca.OP_COPYSIGN: "copysign",
-}
-_NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
 
 # Guards among the model's constants that a float cannot hold, and what does their duty there: 1e-24**(-4/3), the
 # steepest power on the control's way, and exp(85) times a gain of 20 are still finite.
@@ -93,20 +67,17 @@ class _SinglePrecision:
         return _SINGLE.get(value, value)
 
 
-class _Values(Graph):
-    """Value graph of an export: references, measurements, base motion and commands come from outside.
-
-    Graph's own constructor lays out the simulation loop, where they are computed.
-    """
+class _Values(ValueGraph):
+    """Value graph of an export: references, measurements, base motion and commands come from outside."""
 
     def __init__(self, export: Export) -> None:
-        self.nodes, self.outputs, self._index = [], {}, {}
+        super().__init__()
         self._single = export.real == "float"
         self.tunable = tuple(slot.key for slot in export.tunable_slots)
         column = {slot: k for k, slot in enumerate(export.tunable)}
         self._known = {
             "p": [
-                self._leaf("p", column[i], Binding.RUN, True) if i in column else self.constant(value)
+                self.leaf("p", column[i], Binding.RUN, varies=True) if i in column else self.constant(value)
                 for i, value in enumerate(export.values)
             ],
             "d": [self.constant(0.0)] * export.system.d.numel(),  # tables are not part of an export
@@ -118,7 +89,7 @@ class _Values(Graph):
         inputs = [
             self._known[name]
             if name in self._known
-            else [self._leaf(name, k, Binding.STATE) for k in range(function.numel_in(i))]
+            else [self.leaf(name, k, Binding.STATE) for k in range(function.numel_in(i))]
             for i, name in enumerate(names)
         ]
         printed = cast(ca.Function, _SinglePrecision(function)) if self._single else function
@@ -231,11 +202,11 @@ class ScalarPrinter:
                 given = load("derived", self._derived[i]) if derived else load(*node.source)
                 if given != names[i]:
                     lines.append(f"const {self._real} {names[i]} = {given};")
-            return f"{self._math}_true({names[i]})" if node.op in _MASKS else names[i]
+            return f"{self._math}_true({names[i]})" if node.op in MASKS else names[i]
 
         def truth(i: int) -> str:
             text = value(i)
-            return names[i] if nodes[i].op in _MASKS else f"({text} != {literal(0.0, self._real)})"
+            return names[i] if nodes[i].op in MASKS else f"({text} != {literal(0.0, self._real)})"
 
         for i in needed:
             node = nodes[i]
@@ -249,7 +220,7 @@ class ScalarPrinter:
                 ready |= {sine, cosine}
                 continue
             text = self._expression(i, value, truth)
-            kind = "int" if node.op in _MASKS else self._real
+            kind = "int" if node.op in MASKS else self._real
             lines.append(f"const {kind} {names[i]} = {text};")
             ready.add(i)
         values = [value(i) for i in wanted]
@@ -283,31 +254,18 @@ class ScalarPrinter:
 
     def _expression(self, i: int, value: Callable[[int], str], truth: Callable[[int], str]) -> str:
         node = self._graph.nodes[i]
-        op, arguments = node.op, node.arguments
-        assert op is not None
-        if op in _LOGIC:
-            return f"{truth(arguments[0])} {_LOGIC[op]} {truth(arguments[1])}"
-        if op == ca.OP_NOT:
-            return f"!{truth(arguments[0])}"
-        if op == ca.OP_IF_ELSE_ZERO:
-            return f"{self._math}_if({truth(arguments[0])}, {value(arguments[1])})"
-        operands = [value(a) for a in arguments]
-        if op in _INFIX or op in _COMPARISONS:
-            return f" {(_INFIX | _COMPARISONS)[op]} ".join(operands)
-        if op == ca.OP_NEG:
-            return f"-{operands[0]}"
-        if op == ca.OP_SQ:
-            return f"{operands[0]} * {operands[0]}"
-        if op == ca.OP_TWICE:
-            return f"{literal(2.0, self._real)} * {operands[0]}"
-        if op == ca.OP_INV:
-            return f"{literal(1.0, self._real)} / {operands[0]}"
-        if op in (ca.OP_POW, ca.OP_CONSTPOW):
-            exponent = self._graph.nodes[arguments[1]]
-            if exponent.binding is Binding.CONSTANT and exponent.value in SPECIAL_POWERS:
-                return f"{self._math}_pow_{SPECIAL_POWERS[exponent.value]}({operands[0]})"
-        if op in _CALLS:
-            return f"{self._math}_{_CALLS[op]}({', '.join(operands)})"
-        raise UnprintableOperation(
-            f"operation {_NAMES.get(op, op)} cannot be exported; sl_math.h has no function for it"
+        assert node.op is not None
+        exponent: float | None = None
+        if node.op in POWERS and self._graph.nodes[node.arguments[1]].binding is Binding.CONSTANT:
+            exponent = self._graph.nodes[node.arguments[1]].value
+        return print_operation(
+            node.op,
+            node.arguments,
+            library=self._math,
+            value=value,
+            truth=truth,
+            constant=lambda number: literal(number, self._real),
+            exponent=exponent,
+            call=lambda name, operands: f"{self._math}_{name}({', '.join(operands)})",
+            origin=node.origin,
         )

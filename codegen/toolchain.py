@@ -300,9 +300,7 @@ def _build(entry: Path, content: Mapping[str, bytes], command: Sequence[str]) ->
             os.replace(file, entry / file.name)
 
 
-def _call(
-    argv: Sequence[str], *, cwd: Path | None = None, stdin: str = ""
-) -> subprocess.CompletedProcess[str]:
+def _call(argv: Sequence[str], *, cwd: Path | None = None, stdin: str = "") -> subprocess.CompletedProcess[str]:
     """Run a compiler. Raises ToolchainError with the command and the first lines of its messages."""
     environment = dict(os.environ, LC_ALL="C")
     environment.setdefault("ZIG_GLOBAL_CACHE_DIR", str(cache_root() / "zig"))

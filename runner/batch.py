@@ -12,6 +12,7 @@ import logging
 import os
 import platform
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
@@ -27,7 +28,7 @@ from springline.codegen.kernel import Control, Runs
 from springline.codegen.toolchain import ToolchainError
 from springline.runner.dataset import Dataset
 from springline.runner.errors import InputError, Problem
-from springline.runner.plan import Chunk, Columns, Plan
+from springline.runner.plan import Chunk, Columns, Group, Plan
 from springline.runner.scenario import Scenario
 from springline.runner.simulate import field as unit_field
 from springline.runner.simulate import metrics_table, trajectory_schema
@@ -42,6 +43,7 @@ _PAUSE = 0.5
 _REFRESH = 0.2
 _ANSWER = "10s"  # for a scheduler to answer
 _CALIBRATION_STEPS = 2000
+_TIMED = 3
 _CHUNKS_PER_THREAD = 8
 
 
@@ -182,6 +184,9 @@ def _client(scheduler: str, stack: contextlib.ExitStack) -> Any:
 @contextlib.contextmanager
 def _ignoring_interrupts() -> Iterator[None]:
     """Processes that are started here inherit that Ctrl-C is not for them: this one tells them when to end."""
+    if threading.current_thread() is not threading.main_thread():  # which alone may say what a signal does
+        yield
+        return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
@@ -308,25 +313,22 @@ class Estimate:
 
 
 def estimate(plan: Plan, threads: int, left: int | None = None) -> Estimate:
-    """Time the first pack of each kind of work on this machine, and multiply.
+    """Time the first pack of the first kinds of work on this machine, and multiply.
 
     threads  how many work at a time;  left  runs that are not done yet, None for all
     Raises ToolchainError where there is no compiler.
     """
-    rates: dict[int, float] = {}
-    seconds = 0.0
-    for group in plan.groups:
-        key = id(group.work)
-        if key not in rates:
-            rates[key] = _seconds_per_step(plan, group.number)
-        seconds += rates[key] * group.runs * group.work.settings.steps
+    first = {id(group.work): group for group in reversed(plan.groups)}
+    timed = list(reversed(first.values()))[:_TIMED]  # more would be a wait for compilers before the sweep begins
+    per_step = sum(_seconds_per_step(plan, group) for group in timed) / len(timed)
+    steps = sum(group.runs * group.work.settings.steps for group in plan.groups)
     share = 1.0 if left is None else left / plan.runs
-    return Estimate(share * seconds / threads, dataset_bytes(plan))
+    return Estimate(share * per_step * steps / threads, dataset_bytes(plan))
 
 
-def _seconds_per_step(plan: Plan, group: int) -> float:
+def _seconds_per_step(plan: Plan, group: Group) -> float:
     """Seconds for one step of one run among a full pack, measured over a short run."""
-    chunk = plan.chunk_of(plan.groups[group].first)
+    chunk = plan.chunk_of(group.first)
     work = chunk.group.work
     loop = work.kernel()
     parameters = np.resize(plan.parameters(chunk, plan.columns(chunk)), (2 * loop.width, len(work.parameters)))

@@ -18,6 +18,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from numpy.typing import NDArray
 
 from springline.model.parameters import Joint
+from springline.runner import sampling
 from springline.runner.plan import Plan
 from springline.runner.plots import LINES, PAGE, house_style, label, legend_above, panels
 from springline.runner.summary import Summary, group_names
@@ -267,7 +268,8 @@ def _scatter_matrix(runs: _Runs) -> Figure:
     keys = _influence(_correlations(runs))[:_MOST_KEYS]
     columns = [*keys, *(f"{m}_{joint.name}" for m in ("settling_time", "steady_state_error") for joint in runs.joints)]
     figure, grid = panels(len(columns), len(columns), width=PAGE, height=PAGE / len(columns) - 0.06, share_x=False)
-    every = max(1, len(runs.table) // _POINTS)
+    # A random choice: every k-th point of a Sobol sequence leaves holes that the sequence does not have.
+    points = sampling.random(0, "points", 0, len(runs.table)) < _POINTS / max(len(runs.table), 1)
     colors = np.array([line["color"] for line in LINES])[runs.group % len(LINES)]
     for i, row in enumerate(columns):
         for j, column in enumerate(columns):
@@ -275,7 +277,7 @@ def _scatter_matrix(runs: _Runs) -> Figure:
             if j > i:
                 axes.set_visible(False)
                 continue
-            _scatter_panel(runs, axes, column, row, every, colors)
+            _scatter_panel(runs, axes, column, row, points, colors)
             axes.tick_params(labelsize=4, length=1.5, pad=1)
             if i < len(columns) - 1:
                 axes.tick_params(labelbottom=False)
@@ -293,7 +295,9 @@ def _scatter_matrix(runs: _Runs) -> Figure:
     return figure
 
 
-def _scatter_panel(runs: _Runs, axes: Axes, column: str, row: str, every: int, colors: NDArray[Any]) -> None:
+def _scatter_panel(
+    runs: _Runs, axes: Axes, column: str, row: str, points: NDArray[np.bool_], colors: NDArray[Any]
+) -> None:
     """One pair of columns, or on the diagonal the distribution of one."""
     ok = runs.ok
     x, y = runs[column], runs[row]
@@ -303,9 +307,9 @@ def _scatter_panel(runs: _Runs, axes: Axes, column: str, row: str, every: int, c
             space = np.geomspace if _is_log(runs, column, known) else np.linspace
             axes.hist(known, bins=list(space(known.min(), known.max(), 25)), color="0.6")
     else:
-        axes.scatter(x[ok][::every], y[ok][::every], s=1.2, c=colors[ok][::every], linewidths=0, rasterized=True)
-        stopped = ~ok
-        axes.plot(x[stopped][::every], y[stopped][::every], "x", color=_STOPPED, markersize=1.5, rasterized=True)
+        shown, stopped = ok & points, ~ok & points
+        axes.scatter(x[shown], y[shown], s=1.2, c=colors[shown], linewidths=0, rasterized=True)
+        axes.plot(x[stopped], y[stopped], "x", color=_STOPPED, markersize=1.5, rasterized=True)
         known = y[ok & np.isfinite(y)]
         if known.size and _is_log(runs, row, known):
             axes.set_yscale("log")
@@ -363,6 +367,7 @@ def _groups(runs: _Runs) -> Figure:
                 axes.set_xscale("log")
                 _plain_decades(axes.xaxis)
             axes.set_ylim(0, 102)
+            axes.margins(x=0.04)
             axes.set_xlabel(runs.title(column))
             axes.set_ylabel("share of runs [%]")
     legend_above(figure)

@@ -54,6 +54,7 @@ static inline float slf_real(uint32_t b) {
   return u.real;
 }
 
+static inline int slf_not(int m) { return !m; }
 static inline float slf_if(int m, float a) { return m ? a : 0.0f; }
 static inline float slf_true(int m) { return m ? 1.0f : 0.0f; }
 static inline float slf_fmin(float a, float b) { return a < b ? a : b; }

@@ -28,6 +28,13 @@
 #define ceil sl_ceil
 #define copysign sl_copysign
 #define hypot sl_hypot
+#define sinh sl_sinh
+#define cosh sl_cosh
+#define tanh sl_tanh
+#define asin sl_asin
+#define acos sl_acos
+#define atan sl_atan
+#define atan2 sl_atan2
 #endif
 
 #endif

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _LONG = 3600.0
 _LARGE = 10e9
+_SHOWN_KEYS = 5
 
 
 def batch(
@@ -133,6 +134,7 @@ def _finish(plan: Plan, dataset: Dataset, tally: Tally, again: str, *, plot: boo
             print_json("batch", rows, {}, "failed" if problems else "ok")
         else:
             keys = [axis.key for axis in plan.sweep.axes]
+            keys = keys if len(keys) <= _SHOWN_KEYS else []  # summary.md has room for all
             for header, rows_of_text in (outcome_rows(summary), metric_rows(summary), worst_rows(summary, keys)):
                 print_table(header, rows_of_text, right=header[1:])
     if problems:

@@ -1,10 +1,10 @@
 """`springline export fmu2` and `fmu3`: a scenario's controller, plant or closed loop for other simulators."""
 
-# ruff: noqa: PLC0415 - imports that take long wait for the command that needs them
-
 from __future__ import annotations
 
+import hashlib
 import json
+import math
 import re
 from enum import StrEnum
 from pathlib import Path
@@ -87,18 +87,21 @@ def _export(
 
     command = f"export fmu{version}"
     refuse_files(output)
-    before = _earlier(command, output)
+    others = _earlier(command, output, keep_edited=force)
     loaded = load_scenario(scenario)
     stem = re.sub(r"\W", "_", Path(scenario).stem, flags=re.ASCII)
     identifier = name or f"{stem if stem[:1].isalpha() else f'scenario_{stem}'}_{part}_fmi{version}"
     names: Any = tunable if tunable in {"all", "none"} else [key.strip() for key in tunable.split(",")]
     document = loaded.document
+    ending = [table for table in loaded.tables() if table.ends == "error"]
     sampled = document["control"]["mode"] == "sampled"
     settings = Settings(
         duration=float(document["simulation"]["duration"]),
         step=loaded.step,
         period=float(document["control"]["period"]) if sampled else 0.0,
         bound=loaded.bound,
+        since=max((table.t0 for table in ending), default=-math.inf),
+        until=min((table.t0 + table.dt * len(table.coefficients) for table in ending), default=math.inf),
     )
     try:
         content = fmu(
@@ -116,9 +119,9 @@ def _export(
         raise InputError(Problem(f"springline {command}", "", str(error))) from error
     path = f"{identifier}.fmu"
     entry = {"name": path, "fmi": f"{version}.0", "part": part.value, "scenario": stem}
-    others = [fmu for fmu in before if fmu["name"] != path]
-    kept = {fmu["name"]: (output / fmu["name"]).read_bytes() for fmu in others}
-    manifest = {"fmus": sorted([*others, entry], key=lambda fmu: str(fmu["name"]))}
+    others.pop(path, None)
+    kept = {name: (output / name).read_bytes() for name in others}
+    manifest = {"fmus": sorted([*others.values(), entry], key=lambda fmu: str(fmu["name"]))}
     changes = write_tree(output, {**kept, path: content}, manifest, force=force)
     done = "written" if path in changes.written else "unchanged"
     if as_json:
@@ -127,15 +130,27 @@ def _export(
         say(f"{output / path}: FMI {version}.0, {len(content) // 1024} KiB, {done}")
 
 
-def _earlier(command: str, folder: Path) -> list[dict[str, str]]:
-    """What the folder's manifest says of FMUs that are still there; InputError if it belongs to an export of C."""
+def _earlier(command: str, folder: Path, *, keep_edited: bool) -> dict[str, dict[str, str]]:
+    """What the folder's manifest says of FMUs that are still there, by file name: those that are as they were written.
+
+    One that was edited is in the way (write_tree says so), unless it is asked to be kept.
+    Raises InputError if the folder belongs to an export of another kind.
+    """
     try:
         manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     except (FileNotFoundError, NotADirectoryError):
-        return []
+        return {}
     except ValueError:  # no manifest of ours: write_tree says so
-        return []
+        return {}
     if not isinstance(manifest, dict) or "fmus" not in manifest:
         text = f"{folder} holds something else than FMUs (its {MANIFEST} says so): choose another folder with -o"
         raise InputError(Problem(f"springline {command}", "", text))
-    return [fmu for fmu in manifest["fmus"] if (folder / fmu["name"]).is_file()]
+    written = {entry["path"]: entry["sha256"] for entry in manifest["files"]}
+
+    def stays(name: str) -> bool:
+        place = folder / name
+        if not place.is_file():
+            return False
+        return keep_edited or hashlib.sha256(place.read_bytes()).hexdigest() == written.get(name)
+
+    return {entry["name"]: entry for entry in manifest["fmus"] if stays(entry["name"])}

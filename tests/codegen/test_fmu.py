@@ -1,4 +1,4 @@
-"""FMUs: what other tools find in them, that they compute what our own loop does to the last bit, and that they never crash.
+"""FMUs: what other tools find in them, that they compute our own loop to the last bit, and that they never crash.
 
 Two clients that are not ours drive them: fmpy, and the container of fmu-manipulation-toolbox, which is an FMU itself.
 """
@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
+import itertools
 import json
+import math
 import os
 import re
 import subprocess
 import sys
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -190,7 +193,7 @@ def test_contents(build: Build, version: int) -> None:
     with zipfile.ZipFile(path) as archive:
         names = set(archive.namelist())
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
-        root = ET.fromstring(archive.read("modelDescription.xml"))
+        root = ET.fromstring(archive.read("modelDescription.xml"))  # noqa: S314 - our own
         page = archive.read("documentation/index.html").decode()
     icon, licence = {
         2: ("model.png", "documentation/license.txt"),
@@ -221,8 +224,10 @@ def test_parameters_have_units_starts_and_ranges(build: Build, shaken: Program, 
             seen.add((part, slot.key))
             assert variable.unit == slot.unit
             assert float(variable.start) == values[slot.key]
-            for bound, inside in ((variable.min, slot.bounds.low), (variable.max, slot.bounds.high)):
-                assert bound is None or slot.bounds.holds(float(bound)) and abs(float(bound) - inside) < 1e-300 + 2e-16
+            for bound, outwards in ((variable.min, -math.inf), (variable.max, math.inf)):
+                if bound is not None:  # the last number that is admissible
+                    assert slot.bounds.holds(float(bound))
+                    assert not slot.bounds.holds(math.nextafter(float(bound), outwards))
             assert variable.variability == ("fixed" if slot.key.startswith("initial.") else "tunable")
     assert ("controller", "control.delta") in seen and ("controller", "plant.m3") not in seen
     assert ("plant", "plant.m3") in seen and ("plant", "control.delta") not in seen
@@ -273,7 +278,7 @@ def test_exactly_the_functions_of_the_standard_are_exported(
         [nm, "-D", "--defined-only", str(tmp_path / binary)], check=True, capture_output=True, text=True
     ).stdout
     exported = {line.split()[-1] for line in listing.splitlines() if not line.split()[-1].startswith("_")}
-    assert len(declared(version)) == {2: 44, 3: 82}[version]
+    assert len(declared(version)) == {2: 44, 3: 75}[version]
     assert exported == declared(version)
 
 
@@ -380,7 +385,7 @@ def test_start_time_and_uneven_communication_steps(
 
     uneven = open_fmu(build("loop", 2, CONTINUOUS)).start(start)
     times = start + DURATION * np.array([0.0, 0.1001, 0.33333, 0.5, 0.50001, 1.0])
-    for time, after in zip(times, times[1:], strict=False):
+    for time, after in itertools.pairwise(times):
         uneven.step(time, after - time)
     np.testing.assert_allclose(uneven.get(names[:8]), expected[-1, :8], rtol=0, atol=1e-7)  # RK4 at other steps
     assert uneven.get(["time"]) == [times[-1]]
@@ -633,13 +638,16 @@ def test_null_pointers_and_foreign_tokens(build: Build, open_fmu: Callable[[Path
     """Called as C may call it: with nothing where something is expected. Errors, never a crash."""
     client = open_fmu(build("plant", version))
     dll = client.slave.dll
-    for name in sorted(declared(version)):
+    nothing = [ctypes.c_void_p()] * 14
+    for name in sorted(declared(version) - {"fmi2GetTypesPlatform", f"fmi{version}GetVersion"}):
         function = dll[name]
-        if name.endswith(("GetVersion", "GetTypesPlatform")):
-            continue
-        arguments = [ctypes.c_void_p()] * 14
-        function.restype = ctypes.c_void_p if "Instantiate" in name else ctypes.c_int
-        assert function(*arguments) in (None, 2, 3, 0 if name.endswith("FreeInstance") else 3) or "Free" in name, name
+        if "Instantiate" in name:
+            function.restype = ctypes.c_void_p
+            assert function(*nothing) is None
+        elif name.endswith("FreeInstance"):
+            function(*nothing)
+        else:
+            assert function(*nothing) in (2, 3), name  # discard or error
     instance = ctypes.c_void_p(client.slave.component)
     reference = (ctypes.c_uint * 1)(0)
     get = dll[f"fmi{version}GetReal" if version == 2 else "fmi3GetFloat64"]
@@ -650,11 +658,9 @@ def test_null_pointers_and_foreign_tokens(build: Build, open_fmu: Callable[[Path
     assert len(client.messages) == 2
     token = client.slave.guid
     client.slave.guid = "{another}"
+    again = {"callbacks": client.slave.callbacks} if version == 2 else {"logMessage": client.slave.logMessage}
     with pytest.raises(Exception, match="instantiate"):
-        if version == 2:
-            client.slave.instantiate(callbacks=client.slave.callbacks)
-        else:
-            client.slave.instantiate(logMessage=client.slave.logMessage)
+        client.slave.instantiate(**again)
     client.slave.guid, client.slave.component = token, instance.value
     assert "the token is {another}" in client.messages[-1]
 

@@ -157,7 +157,9 @@ def test_own_mathematics_stay_within_rounding(functions: list[ca.Function], shak
             expected = function.call([ca.DM(a) for a in inputs])
             scale = None
             for actual, value in zip(call(library, function, inputs), expected, strict=True):
-                difference = np.nanmax(np.abs(actual - np.array(value).ravel(order="F")), initial=0.0)
+                reference = np.array(value).ravel(order="F")
+                differ = (actual != reference) & ~(np.isnan(actual) & np.isnan(reference))
+                difference = np.abs(actual[differ] - reference[differ]).max(initial=0.0)
                 if difference > 0.0:
                     scale = largest_intermediates(function, inputs) if scale is None else scale
                     worst = max(worst, difference / (scale * np.finfo(float).eps))

@@ -95,6 +95,17 @@ static int fmu_given(const fmu_instance *fmu, const char *function, const void *
   return 0;
 }
 
+/* ---- time -------------------------------------------------------------------------------------------------- */
+
+/* Time of half grid step j, as in the simulation loop: never accumulated. */
+static double fmu_grid_time(const fmu_state *now, int64_t j) { return now->start + (0.5 * (double)j) * FMU_GRID; }
+
+/* How far a time may be off and still be meant: importers add steps up, we do not. */
+static double fmu_tolerance(double t) {
+  const double grid = 1e-3 * FMU_GRID, digits = 1e-12 * sl_fabs(t);
+  return FMU_GRID > 0.0 ? sl_fmax(grid, digits) : sl_fmax(1e-9, digits);
+}
+
 /* ---- life -------------------------------------------------------------------------------------------------- */
 
 static void fmu_reset(fmu_instance *fmu) {
@@ -149,6 +160,9 @@ static int fmu_refresh(fmu_instance *fmu, const char *function) {
 static int fmu_set_experiment(fmu_instance *fmu, const char *function, double start, int has_stop, double stop) {
   if (!sl_isfinite(start) || (has_stop && !(sl_isfinite(stop) && stop >= start))) {
     return fmu_refuse(fmu, "%s: start time %g s and stop time %g s are no interval", function, start, stop);
+  }
+  if (start < (FMU_SINCE) - fmu_tolerance(start)) {
+    return fmu_refuse(fmu, "%s: start time %g s, but the scenario's tables begin at %g s", function, start, FMU_SINCE);
   }
   fmu->now.start = fmu->now.time = fmu->now.values[0] = start;
   fmu->now.stop = has_stop ? stop : 0.0;
@@ -210,16 +224,7 @@ static int fmu_set(fmu_instance *fmu, const char *function, unsigned reference, 
   return FMU_OK;
 }
 
-/* ---- time -------------------------------------------------------------------------------------------------- */
-
-/* Time of half grid step j, as in the simulation loop: never accumulated. */
-static double fmu_grid_time(const fmu_state *now, int64_t j) { return now->start + (0.5 * (double)j) * FMU_GRID; }
-
-/* How far a time may be off and still be meant: importers add steps up, we do not. */
-static double fmu_tolerance(double t) {
-  const double grid = 1e-3 * FMU_GRID, digits = 1e-12 * sl_fabs(t);
-  return FMU_GRID > 0.0 ? sl_fmax(grid, digits) : sl_fmax(1e-9, digits);
-}
+/* ---- steps ------------------------------------------------------------------------------------------------- */
 
 static int fmu_do_step(fmu_instance *fmu, const char *function, double from, double length) {
   fmu_state *now = &fmu->now;
@@ -233,6 +238,9 @@ static int fmu_do_step(fmu_instance *fmu, const char *function, double from, dou
   }
   if (now->has_stop && until > now->stop + fmu_tolerance(until)) {
     return fmu_refuse(fmu, "%s: a step to %.17g s, but the experiment stops at %.17g s", function, until, now->stop);
+  }
+  if (until > (FMU_UNTIL) + fmu_tolerance(until)) {
+    return fmu_refuse(fmu, "%s: a step to %.17g s, but the scenario's tables end at %.17g s", function, until, FMU_UNTIL);
   }
   if (FMU_GRID > 0.0 && length / FMU_GRID > 1e9) {
     return fmu_refuse(fmu, "%s: a step of %g s is more than 1e9 steps of %g s", function, length, FMU_GRID);
