@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 
-SAMPLE, DURATION = 1e-3, 4.0  # s
+SAMPLE, DURATION = 1e-3, 2.5  # s
 INNER = 4  # integration steps of the arm per sample
 
 

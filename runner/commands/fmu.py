@@ -101,7 +101,7 @@ def _export(
         period=float(document["control"]["period"]) if sampled else 0.0,
         bound=loaded.bound,
         since=max((table.t0 for table in ending), default=-math.inf),
-        until=min((table.t0 + table.dt * len(table.coefficients) for table in ending), default=math.inf),
+        until=min((table.end for table in ending), default=math.inf),
     )
     try:
         content = fmu(

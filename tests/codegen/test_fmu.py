@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
+import io
 import itertools
 import json
 import math
@@ -250,13 +251,25 @@ def test_same_bytes_twice(shaken: Program, values_of: Values, build: Build, monk
     assert again == path.read_bytes()
 
 
-def test_another_number_is_another_token(shaken: Program, values_of: Values, build: Build) -> None:
-    fmpy = client_library("fmpy")
-    path = build("controller", 3)
-    other = path.with_name("other.fmu")
-    other.write_bytes(arm(shaken, values_of(shaken, {"control.k1": 4.0}), "controller", 3, SAMPLED, path.stem))
-    tokens = {fmpy.read_model_description(str(p)).instantiationToken for p in (path, other)}
-    assert len(tokens) == 2
+def test_another_number_is_another_token(
+    shaken: Program, values_of: Values, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    binary = tmp_path / "library.so"
+    binary.write_bytes(b"not built")
+    monkeypatch.setattr(toolchain, "build_library", lambda *_, **__: binary)
+
+    def token(overrides: dict[str, float], settings: Settings = SAMPLED) -> str:
+        content = arm(shaken, values_of(shaken, overrides), "controller", 3, settings, "a")
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            found = re.search(rb'instantiationToken="([^"]+)"', archive.read("modelDescription.xml"))
+            assert found is not None
+            assert found[1] in archive.read("sources/fmu_token.h")
+        return found[1].decode()
+
+    first = token({})
+    assert token({}) == first
+    assert token({"control.k1": 4.0}) != first
+    assert token({}, CONTINUOUS) != first
 
 
 def declared(version: int) -> set[str]:
@@ -397,21 +410,17 @@ def test_table_signals(open_fmu: Callable[[Path], Client], values_of: Values, tm
     table = Table(-0.05, 0.0625, True, random.normal(0.0, 0.1, (4, 2, 4)))
     values = values_of(moved)
     path = tmp_path / "table.fmu"
-    path.write_bytes(
-        fmu(
-            moved.system.structure,
-            values,
-            SAMPLED,
-            part="loop",
-            version=3,
-            identifier="table",
-            name="t",
-            tables=[table],
-        )
+    ending = replace(SAMPLED, since=0.0, until=DURATION)
+    content = fmu(
+        moved.system.structure, values, ending, part="loop", version=3, identifier="table", name="table", tables=[table]
     )
+    path.write_bytes(content)
     names = columns(moved)
     client = open_fmu(path).start()
     np.testing.assert_array_equal(driven(client, names), own_run(moved, values, True, tables=[table]))
+    refused(client, lambda: client.step(DURATION), "the scenario's tables end at 0.29999999999999999 s")
+    early = open_fmu(path)
+    refused(early, lambda: early.start(-0.1), "the scenario's tables begin at 0 s")
 
 
 @pytest.mark.parametrize("version", [2, 3])
