@@ -32,10 +32,12 @@ static int fmu_advance(fmu_instance *fmu, double until) {
   int status = fmu_evaluate(fmu); /* the command of a sample that was never asked for is held too */
   if (FMU_GRID > 0.0) {
     const int64_t before = now->step;
-    const double reached = until + fmu_tolerance(until);
-    while (fmu_grid_time(now, 2 * (now->step + 1)) <= reached) now->step++;
-    now->between = until - fmu_grid_time(now, 2 * now->step) > fmu_tolerance(until);
-    if (status == SPRINGLINE_OK && now->step - before > !now->between) status = fmu_sample(fmu); /* samples on the way */
+    const double tolerance = fmu_tolerance(until);
+    int64_t on_the_way;
+    while (fmu_grid_time(now, 2 * (now->step + 1)) <= until + tolerance) now->step++;
+    now->between = until - fmu_grid_time(now, 2 * now->step) > tolerance;
+    on_the_way = now->step - before - (now->between ? 0 : 1); /* samples before `until` see the inputs that are held */
+    if (status == SPRINGLINE_OK && on_the_way > 0) status = fmu_sample(fmu);
   }
   if (status == SPRINGLINE_OK) now->time = until;
   return status;

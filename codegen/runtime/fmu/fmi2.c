@@ -1,5 +1,6 @@
 /*
- * fmi2.c - the functions of FMI 2.0 for Co-Simulation; those for Model Exchange are there and say that they are not offered.
+ * fmi2.c - the functions of FMI 2.0 for Co-Simulation; those for Model Exchange are there and say that they are not
+ * offered.
  *
  * Built as a shared library the functions have their plain names. For static linking define FMI2_FUNCTION_PREFIX as the
  * model identifier followed by an underscore, as the standard asks.
@@ -10,7 +11,7 @@ typedef fmi2CallbackLogger fmu_logger;
 
 #include "instance.h"
 
-/* The standard's message is a format. Clients without variadic callbacks take it as it is, so it holds the text itself. */
+/* The standard's message is a format. Clients without variadic callbacks take it as it is: it holds the text itself. */
 static void fmu_log(const fmu_instance *fmu, const char *message) {
   char format[2 * FMU_MESSAGE];
   size_t n = 0;

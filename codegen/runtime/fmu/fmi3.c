@@ -85,7 +85,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
                      instanceEnvironment);
 }
 
-void fmi3FreeInstance(fmi3Instance instance) { (void)instance; }
+void fmi3FreeInstance(fmi3Instance instance) { free(instance); }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
