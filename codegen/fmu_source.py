@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import textwrap
 from collections.abc import Sequence
 from importlib import resources
 
@@ -81,7 +82,12 @@ def _model(
     tables: Sequence[Table],
 ) -> str:
     part, system = interface.part, export.system
-    grid = settings.step if part != "controller" else settings.period
+    if part == "controller":  # its signals come from outside
+        grid, grid_meaning = settings.period, "s, sample period; 0: at every time"
+        since, until = -math.inf, math.inf
+    else:
+        grid, grid_meaning = settings.step, "s, step of the integrator"
+        since, until = settings.since, settings.until
     hold = round(settings.period / settings.step)
     lines = [
         "#include <stdint.h>",
@@ -90,14 +96,13 @@ def _model(
         '#include "fmu_token.h"',
         '#include "sl_math.h"',
         "",
-        f"#define FMU_GRID {literal(grid, 'double')} /* s, "
-        + ("step of the integrator */" if part != "controller" else "sample period; 0: at every time */"),
-        f"#define FMU_BOUND {literal_constant(settings.bound, 'double')} /* the plant may not leave it, SI */",
         *(
-            f"#define {name} {literal_constant(time if part != 'controller' else anytime, 'double')} /* s */"
-            for name, time, anytime in (
-                ("FMU_SINCE", settings.since, -math.inf),
-                ("FMU_UNTIL", settings.until, math.inf),
+            f"#define {name} ({literal_constant(value, 'double')}) /* {meaning} */"
+            for name, value, meaning in (
+                ("FMU_GRID", grid, grid_meaning),
+                ("FMU_BOUND", settings.bound, "the plant may not leave it, SI"),
+                ("FMU_SINCE", since, "s, where the scenario's signals begin"),
+                ("FMU_UNTIL", until, "s, where they end"),
             )
         ),
         f"#define FMU_HOLD {hold} /* steps per sample of the control, 0: continuous */",
@@ -267,7 +272,8 @@ def _glue(export: Export, typed: TypedInterface, interface: Interface, settings:
             "",
             "static void fmu_slope(const double *parameters, const springline_base *base, const double *x,",
             "                      const springline_command *command, double *slope) {",
-            f"  const double b[] = {{{', '.join(base)}}};",
+            "  const double b[] = {",
+            *textwrap.wrap(", ".join(base) + "};", 110, initial_indent="    ", subsequent_indent="    "),
             f"  const double u[] = {{{commands}}};",
             f"  const double *arg[] = {{b, b + {third}, b + {2 * third}, x, u{p}}};",
             "  double *res[] = {slope};",

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from springline.codegen import toolchain
 from springline.runner.cli import app
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fmu_coupling.py"
@@ -55,7 +56,10 @@ def test_same_export_changes_nothing(folder: Path) -> None:
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
-def test_scenario_file_name_and_tunable(tmp_path: Path) -> None:
+def test_scenario_file_name_and_tunable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    binary = tmp_path / "library.so"
+    binary.write_bytes(b"not built: only the description is looked at")
+    monkeypatch.setattr(toolchain, "build_library", lambda *_, **__: binary)
     scenario = tmp_path / "2nd arm.toml"
     scenario.write_text('[control]\nmode = "sampled"\nperiod = 2e-3\n[simulation]\nduration = 3.0\n')
     arguments = ("--part", "controller", "--tunable", "control.mu,control.delta", "-o", tmp_path / "out")

@@ -1,6 +1,6 @@
 /*
- * fmi3.c - the functions of FMI 3.0 for Co-Simulation; those for other interface types, clocks and derivatives are there
- * and say that they are not offered.
+ * fmi3.c - the functions of FMI 3.0 for Co-Simulation; those for other interface types, clocks and derivatives are
+ * there and say that they are not offered.
  *
  * Built as a shared library the functions have their plain names. For static linking define FMI3_FUNCTION_PREFIX as the
  * model identifier followed by an underscore, as the standard asks.

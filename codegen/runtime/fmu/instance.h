@@ -1,5 +1,5 @@
 /*
- * instance.h - an FMU instance, whatever the version of FMI: its values, its time, its modes and what may be done in them.
+ * instance.h - an FMU instance, whatever the version of FMI: its values, its time, its modes and what they allow.
  *
  * Included once, by fmi2.c or fmi3.c, which define fmu_logger and fmu_log; fmu_model.h says what variables there are.
  * One of controller.c, plant.c and loop.c says what they do: fmu_begin, fmu_evaluate, fmu_advance.
@@ -161,7 +161,7 @@ static int fmu_set_experiment(fmu_instance *fmu, const char *function, double st
   if (!sl_isfinite(start) || (has_stop && !(sl_isfinite(stop) && stop >= start))) {
     return fmu_refuse(fmu, "%s: start time %g s and stop time %g s are no interval", function, start, stop);
   }
-  if (start < (FMU_SINCE) - fmu_tolerance(start)) {
+  if (start < FMU_SINCE - fmu_tolerance(start)) {
     return fmu_refuse(fmu, "%s: start time %g s, but the scenario's tables begin at %g s", function, start, FMU_SINCE);
   }
   fmu->now.start = fmu->now.time = fmu->now.values[0] = start;
@@ -239,8 +239,9 @@ static int fmu_do_step(fmu_instance *fmu, const char *function, double from, dou
   if (now->has_stop && until > now->stop + fmu_tolerance(until)) {
     return fmu_refuse(fmu, "%s: a step to %.17g s, but the experiment stops at %.17g s", function, until, now->stop);
   }
-  if (until > (FMU_UNTIL) + fmu_tolerance(until)) {
-    return fmu_refuse(fmu, "%s: a step to %.17g s, but the scenario's tables end at %.17g s", function, until, FMU_UNTIL);
+  if (until > FMU_UNTIL + fmu_tolerance(until)) {
+    return fmu_refuse(fmu, "%s: a step to %.17g s, but the scenario's tables end at %.17g s", function, until,
+                      FMU_UNTIL);
   }
   if (FMU_GRID > 0.0 && length / FMU_GRID > 1e9) {
     return fmu_refuse(fmu, "%s: a step of %g s is more than 1e9 steps of %g s", function, length, FMU_GRID);
@@ -298,7 +299,8 @@ static int fmu_serialize(const fmu_instance *fmu, const char *function, const vo
   return FMU_OK;
 }
 
-static int fmu_deserialize(const fmu_instance *fmu, const char *function, const void *bytes, size_t size, void **saved) {
+static int fmu_deserialize(const fmu_instance *fmu, const char *function, const void *bytes, size_t size,
+                           void **saved) {
   fmu_serialized form;
   fmu_state *copy;
   if (size < sizeof form) return fmu_refuse(fmu, "%s: these bytes are too few for a state", function);

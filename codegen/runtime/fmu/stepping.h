@@ -1,8 +1,8 @@
 /*
  * stepping.h - fixed steps to wherever the importer wants to be, for plant.c and loop.c.
  *
- * Steps end at the grid start + k h, so that communication steps of whole multiples of h give the bits of the simulation
- * loop. A communication point inside a step cuts it in two.
+ * Steps end at the grid start + k h, so that communication steps of whole multiples of h give the bits of the
+ * simulation loop. A communication point inside a step cuts it in two.
  */
 typedef struct {
   double t[3]; /* start, middle, end */

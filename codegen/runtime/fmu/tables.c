@@ -1,4 +1,4 @@
-/* tables.c - signals of a scenario that come from tables: cubics on uniform knots, as the simulation loop reads them. */
+/* tables.c - signals that come from a scenario's tables: cubics on uniform knots, as the simulation loop reads them. */
 
 /* Table data at time t: per table tau, s from the knot, then four coefficients a channel. */
 static void fmu_table_data(double t, double *d) {
