@@ -142,7 +142,7 @@ class TypedInterface:
         system = export.system
         blocks = {f"{name}_fields": self._fields(name) for name in self.structures if name != "parameters"}
         blocks |= {
-            f"{name}_is_finite": _all(f"finite({name}->{field.name})" for field in self.structures[name])
+            f"{name}_is_finite": _all(f"is_finite({name}->{field.name})" for field in self.structures[name])
             for name in ("reference", "measurement", "command", "base")
         }
         diagnostics = self.structures["diagnostics"]
@@ -159,7 +159,7 @@ class TypedInterface:
             "zero_command": self._zeros("command"),
             "zero_diagnostics": self._zeros("diagnostics"),
             "zero_base": self._zeros("base"),
-            "control_is_finite": _all(f"finite({value})" for value in (*values, *sums)),
+            "control_is_finite": _all(f"is_finite({value})" for value in (*values, *sums)),
             "control": "\n".join(["  (void)controller;", *self._lines("control"), *flags]),
             "plant": "\n".join(["  (void)controller, (void)base;", *self._lines("plant")]),
             "start": "\n".join(self._lines("start")),
@@ -255,7 +255,7 @@ def literal_constant(value: float, real: Real) -> str:
 
 def bounds_tests(expression: str, bounds: Bounds, real: Real) -> list[str]:
     """C conditions that hold if and only if the value is admissible; NaN never is."""
-    tests = [] if bounds.infinite else [f"finite({expression})"]
+    tests = [] if bounds.infinite else [f"is_finite({expression})"]
     if not math.isinf(bounds.low):
         tests.append(f"{expression} {'>' if bounds.low_open else '>='} {literal(bounds.low, real)}")
     if not math.isinf(bounds.high):

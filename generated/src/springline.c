@@ -324,61 +324,61 @@ static void plant(const springline_controller *controller, const springline_base
 
 /* ---- checks ------------------------------------------------------------------------------------------------ */
 
-static int finite(real x) { return sl_isfinite(x); }
+static int is_finite(real x) { return sl_isfinite(x); }
 
 static int reference_is_finite(const springline_reference *reference) {
-  return finite(reference->q1d_lift) &&
-         finite(reference->q1d_rotation) &&
-         finite(reference->dq1d_lift) &&
-         finite(reference->dq1d_rotation) &&
-         finite(reference->ddq1d_lift) &&
-         finite(reference->ddq1d_rotation);
+  return is_finite(reference->q1d_lift) &&
+         is_finite(reference->q1d_rotation) &&
+         is_finite(reference->dq1d_lift) &&
+         is_finite(reference->dq1d_rotation) &&
+         is_finite(reference->ddq1d_lift) &&
+         is_finite(reference->ddq1d_rotation);
 }
 
 static int measurement_is_finite(const springline_measurement *measurement) {
-  return finite(measurement->q1_lift) &&
-         finite(measurement->q1_rotation) &&
-         finite(measurement->dq1_lift) &&
-         finite(measurement->dq1_rotation) &&
-         finite(measurement->dq2_lift) &&
-         finite(measurement->dq2_rotation);
+  return is_finite(measurement->q1_lift) &&
+         is_finite(measurement->q1_rotation) &&
+         is_finite(measurement->dq1_lift) &&
+         is_finite(measurement->dq1_rotation) &&
+         is_finite(measurement->dq2_lift) &&
+         is_finite(measurement->dq2_rotation);
 }
 
 static int command_is_finite(const springline_command *command) {
-  return finite(command->U_lift) &&
-         finite(command->U_rotation);
+  return is_finite(command->U_lift) &&
+         is_finite(command->U_rotation);
 }
 
 static int base_is_finite(const springline_base *base) {
-  return finite(base->y_r1) &&
-         finite(base->theta_1z) &&
-         finite(base->theta_1x) &&
-         finite(base->d_y_r1) &&
-         finite(base->d_theta_1z) &&
-         finite(base->d_theta_1x) &&
-         finite(base->dd_y_r1) &&
-         finite(base->dd_theta_1z) &&
-         finite(base->dd_theta_1x);
+  return is_finite(base->y_r1) &&
+         is_finite(base->theta_1z) &&
+         is_finite(base->theta_1x) &&
+         is_finite(base->d_y_r1) &&
+         is_finite(base->d_theta_1z) &&
+         is_finite(base->d_theta_1x) &&
+         is_finite(base->dd_y_r1) &&
+         is_finite(base->dd_theta_1z) &&
+         is_finite(base->dd_theta_1x);
 }
 
 /* Looks at what stands before the limits, for a limit turns NaN and infinity into a number. */
 static int control_is_finite(const springline_diagnostics *diagnostics) {
-  return finite(diagnostics->e_lift) &&
-         finite(diagnostics->e_rotation) &&
-         finite(diagnostics->sigma_lift) &&
-         finite(diagnostics->sigma_rotation) &&
-         finite(diagnostics->U_s_lift) &&
-         finite(diagnostics->U_s_rotation) &&
-         finite(diagnostics->U_f_lift) &&
-         finite(diagnostics->U_f_rotation) &&
-         finite(diagnostics->U_s_lift + diagnostics->U_f_lift) &&
-         finite(diagnostics->U_s_rotation + diagnostics->U_f_rotation);
+  return is_finite(diagnostics->e_lift) &&
+         is_finite(diagnostics->e_rotation) &&
+         is_finite(diagnostics->sigma_lift) &&
+         is_finite(diagnostics->sigma_rotation) &&
+         is_finite(diagnostics->U_s_lift) &&
+         is_finite(diagnostics->U_s_rotation) &&
+         is_finite(diagnostics->U_f_lift) &&
+         is_finite(diagnostics->U_f_rotation) &&
+         is_finite(diagnostics->U_s_lift + diagnostics->U_f_lift) &&
+         is_finite(diagnostics->U_s_rotation + diagnostics->U_f_rotation);
 }
 
 static int state_is_finite(const real *x) {
   int i;
   for (i = 0; i < 8; i++) {
-    if (!finite(x[i])) return 0;
+    if (!is_finite(x[i])) return 0;
   }
   return 1;
 }
@@ -439,7 +439,7 @@ int springline_plant_step(const springline_controller *controller, springline_st
   int stage, i;
   if (controller == NULL || state == NULL || command == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  if (!finite(step) || step <= 0.0 || !command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
+  if (!is_finite(step) || step <= 0.0 || !command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
   for (i = 0; base != NULL && i < 3; i++) {
     if (!base_is_finite(&base[i])) return SPRINGLINE_BAD_PLANT_INPUT;
   }
@@ -494,7 +494,7 @@ int springline_signals(const springline_controller *controller, springline_real 
                        springline_base *base) {
   if (controller == NULL || reference == NULL || base == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  if (!finite(t)) return SPRINGLINE_BAD_TIME;
+  if (!is_finite(t)) return SPRINGLINE_BAD_TIME;
   {
     const double a0 = 3.141592653589793 * t;
     const double a1 = a0 + 0.0;

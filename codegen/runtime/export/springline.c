@@ -31,7 +31,7 @@ static void plant(const springline_controller *controller, const springline_base
 
 /* ---- checks ------------------------------------------------------------------------------------------------ */
 
-static int finite(real x) { return {{math}}_isfinite(x); }
+static int is_finite(real x) { return {{math}}_isfinite(x); }
 
 static int reference_is_finite(const springline_reference *reference) {
   return {{reference_is_finite}};
@@ -57,7 +57,7 @@ static int control_is_finite(const springline_diagnostics *diagnostics) {
 static int state_is_finite(const real *x) {
   int i;
   for (i = 0; i < {{states}}; i++) {
-    if (!finite(x[i])) return 0;
+    if (!is_finite(x[i])) return 0;
   }
   return 1;
 }
@@ -118,7 +118,7 @@ int springline_plant_step(const springline_controller *controller, springline_st
   int stage, i;
   if (controller == NULL || state == NULL || command == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  if (!finite(step) || step <= 0.0{{f}} || !command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
+  if (!is_finite(step) || step <= 0.0{{f}} || !command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
   for (i = 0; base != NULL && i < 3; i++) {
     if (!base_is_finite(&base[i])) return SPRINGLINE_BAD_PLANT_INPUT;
   }
@@ -152,7 +152,7 @@ int springline_signals(const springline_controller *controller, springline_real 
                        springline_base *base) {
   if (controller == NULL || reference == NULL || base == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  if (!finite(t)) return SPRINGLINE_BAD_TIME;
+  if (!is_finite(t)) return SPRINGLINE_BAD_TIME;
   {
 {{signals}}
   }
