@@ -187,9 +187,14 @@ def bind(
             raise ValueError(f"{slot.key} is {value!r}, expected {slot.bounds}")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
         raise ValueError(f"prefix {prefix!r} is no C identifier: letters, digits and _, a letter first")
+    if re.fullmatch(r"slf?(_.*)?|casadi(_.*)?", prefix):
+        raise ValueError(f"prefix {prefix!r} belongs to the library inside the C: choose another")
     if real not in ("double", "float"):
         raise ValueError(f"real is {real!r}, expected 'double' or 'float'")
     return Export(system, numbers, _tunable(system.slots, tunable), prefix, real)
+
+
+_STRUCTURE = frozenset(f"control.{key}" for key in ("law", "log_form", "mode", "period", "fast", "l", "m", "p", "r"))
 
 
 def _tunable(slots: Sequence[Slot], names: Sequence[str] | str) -> tuple[int, ...]:
@@ -205,6 +210,8 @@ def _tunable(slots: Sequence[Slot], names: Sequence[str] | str) -> tuple[int, ..
         if not found:
             keys = [slot.key for slot in slots]
             near = difflib.get_close_matches(name, keys, 1, 0.0)
+            if name in _STRUCTURE:
+                raise ValueError(f"{name!r} is structure and never tunable: export once for each of its values")
             raise ValueError(f"no parameter {name!r}; the nearest name is {near[0]!r}")
         chosen |= found
     return tuple(sorted(chosen))

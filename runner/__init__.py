@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from springline.runner.batch import batch
+    from springline.runner.errors import InputError
     from springline.runner.scenario import load_scenario
     from springline.runner.simulate import simulate
 
-__all__ = ["batch", "load_scenario", "simulate"]
+__all__ = ["InputError", "batch", "load_scenario", "simulate"]
 
-_HOME = {"batch": "batch", "load_scenario": "scenario", "simulate": "simulate"}
+_HOME = {"InputError": "errors", "batch": "batch", "load_scenario": "scenario", "simulate": "simulate"}
 
 
 class _Package(ModuleType):

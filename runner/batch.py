@@ -363,8 +363,10 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
              the kernel (compiled on first use, then cached)
     jobs     threads, None for one per processor
     Returns a table with one row a run: run, the varied keys, every metric, status, t_end. It does not depend on `jobs`.
-    Raises InputError for an unknown key or a value out of bounds, ValueError for arrays of different lengths.
+    Raises InputError for an unknown key or a value out of bounds, ValueError for unequal lengths or jobs < 1.
     """
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"jobs is {jobs}, expected at least 1")
     arrays = {key: np.atleast_1d(np.asarray(values, dtype=np.float64)) for key, values in columns.items()}
     lengths = {key: len(values) for key, values in arrays.items()}
     if len(set(lengths.values())) != 1 or 0 in lengths.values():

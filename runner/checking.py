@@ -141,8 +141,8 @@ def _sampling_problems(document: Document, given: Mapping[str, object], where: W
             return []
         text = f"is missing: expected {schema.number_text(POSITIVE, 's')}, for the control is sampled"
         return [Problem(where(key), key, text)]
-    if "mode" not in given:  # else a forgotten mode would go unnoticed
-        return [Problem(where(key), key, 'only goes with mode = "sampled"', 'no mode (the default is "continuous")')]
+    if control.get("mode") != "sampled":  # else a forgotten mode would go unnoticed
+        return [Problem(where(key), key, 'only goes with control.mode = "sampled"', 'mode = "continuous"')]
     return _whole_problems(document, key, where)
 
 

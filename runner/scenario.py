@@ -236,7 +236,7 @@ class Scenario:
     def with_overrides(self, overrides: Mapping[str, object]) -> Scenario:
         """This scenario with other values at some dotted keys ("control.mu.0", "plant.m3.scale", …).
 
-        A new kind of reference or base motion, or a new mechanism, drops what belonged to the old one.
+        A new kind of reference or base motion, another control mode or mechanism drops what belonged to the old one.
         Raises InputError for whatever a file may not hold either.
         """
         document = copy.deepcopy(self.document)
@@ -244,6 +244,8 @@ class Scenario:
             kind = overrides.get(f"{table}.kind", document[table]["kind"])
             if kind != document[table]["kind"]:
                 document[table] = {"kind": kind}
+        if overrides.get("control.mode") == "continuous":
+            document["control"].pop("period", None)
         if overrides.get("mechanism.name", self.document["mechanism"]["name"]) != self.document["mechanism"]["name"]:
             control = {k: v for k, v in document["control"].items() if not isinstance(v, list)}
             document = {name: document[name] for name in ("base_motion", "simulation")} | {"control": control}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Thread
+from typing import get_args
 
 import numpy as np
 import pyarrow as pa
@@ -25,10 +26,12 @@ from springline.codegen.kernel import (
 from springline.model.base import COORDINATES
 from springline.model.parameters import Joint
 from springline.model.system import System
+from springline.runner.errors import InputError, Problem
 from springline.runner.scenario import Scenario
 from springline.runner.tables import Table as SignalTable
 
 Floats = NDArray[np.float64]
+_MOST_ROWS = 10_000_000
 Progress = Callable[[float], None]
 
 _METRIC_UNITS = {
@@ -159,8 +162,12 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
 
     engine    "lanes", or "casadi" for the C that CasADi prints; the results are the same to the last bit
     progress  called now and then with the share that is done (0 .. 1)
-    Raises ToolchainError if there is no C compiler.
+    Raises InputError if the trajectory would have more than 10 million rows, ValueError for an unknown engine,
+    ToolchainError if there is no C compiler.
     """
+    if engine not in get_args(Engine):
+        raise ValueError(f"engine is {engine!r}, expected one of {', '.join(get_args(Engine))}")
+    _refuse_endless(scenario)
     loop = kernel(scenario.structure(), scenario.control_every > 0, KernelOptions(engine=engine, width=1, groups=1))
     settings = loop_settings(scenario, trajectory=True)
     tables = kernel_tables(scenario.tables())
@@ -171,6 +178,16 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     trajectory = pa.Table.from_arrays([pa.array(column) for column in rows.T], schema=trajectory_schema(system))
     status, message = outcome(system, runs, 0, settings)
     return Result(trajectory, metrics_table(system.joints, runs), status, message)
+
+
+def _refuse_endless(scenario: Scenario) -> None:
+    """Raise InputError if the trajectory would not fit into any memory."""
+    rows = scenario.steps // scenario.output_every + 1
+    if rows > _MOST_ROWS:
+        enough = -(-scenario.steps // _MOST_ROWS)
+        key = "simulation.output_every"
+        text = f"expected at least {enough} for {scenario.steps} steps: {rows} rows are more than {_MOST_ROWS}"
+        raise InputError(Problem("scenario", key, text, str(scenario.output_every)))
 
 
 def _watched(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-_PIPED_WIDTH = 160
+_PIPED_WIDTH = 10_000
 _PATIENCE = 1.0
 
 
@@ -33,9 +32,9 @@ def version() -> str:
 def console(*, stderr: bool = False) -> Console:
     """Where to write, made anew for each use, for tests and shells replace sys.stdout.
 
-    A pipe has no width to fold lines at, so what reads it gets long lines, unless $COLUMNS says otherwise.
+    A pipe has no width to fold lines at, so what reads it gets whole lines.
     """
-    piped = not (sys.stderr if stderr else sys.stdout).isatty() and "COLUMNS" not in os.environ
+    piped = not (sys.stderr if stderr else sys.stdout).isatty()
     return Console(stderr=stderr, width=_PIPED_WIDTH if piped else None, highlight=False, markup=False)
 
 

@@ -2,6 +2,8 @@
 
 import os
 import shutil
+import signal
+import threading
 from collections.abc import Callable
 
 import pytest
@@ -18,6 +20,9 @@ def pytest_configure(config: pytest.Config) -> None:
     # one can only be the right one.
     os.environ["SPRINGLINE_CACHE"] = str(config.rootpath / ".pytest_cache" / "springline")
     os.environ["MPLBACKEND"] = "Agg"
+    # A shell that starts the tests in the background has them ignore Ctrl-C, which is part of what is tested.
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

@@ -17,8 +17,8 @@ import pytest
 pytestmark = pytest.mark.xdist_group("packaging")
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("codegen", "generated", "model", "runner")
-CARRIED = (*PACKAGES, "benchmarks", "docs", "examples", "tests")
+PACKAGES = ("benchmarks", "codegen", "generated", "model", "runner")
+CARRIED = (*PACKAGES, "docs", "examples", "tests")
 PYTHON = [sys.executable, "-I"]  # isolated: neither the current folder nor PYTHONPATH may help
 
 

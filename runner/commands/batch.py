@@ -47,7 +47,7 @@ def batch(
             help="A dask scheduler, tcp://host:port, or local:N for N worker processes here.",
         ),
     ] = "",
-    plot: Annotated[bool, typer.Option(" /--no-plot", show_default=False, help="Draw no figures.")] = True,
+    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Draw figures.")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print what became of the runs as JSON.")] = False,
 ) -> None:
     """Simulate every run of a sweep; write a table with one row a run, and a summary.
@@ -70,15 +70,15 @@ def batch(
             _describe(plan, cost, pool, destination, as_json=as_json)
         return
     again = shlex.join(["springline", "batch", sweep, "-o", destination, "--resume"])
-    with dataset.place.locked():
+    with open_pool(jobs, scheduler) as pool, dataset.place.locked():
         plan = dataset.begin(plan, versions(), resume=resume)
         done = dataset.done(plan)
         try:
-            with open_pool(jobs, scheduler) as pool:
-                _warn(estimate(plan, pool.threads, plan.runs - sum(plan.chunk(k).runs for k in done)), again)
-                with _progress(plan, quiet=as_json) as report:
-                    tally = run_sweep(plan, dataset, pool, done, report)
+            _warn(estimate(plan, pool.threads, plan.runs - sum(plan.chunk(k).runs for k in done)), again)
+            with _progress(plan, quiet=as_json) as report:
+                tally = run_sweep(plan, dataset, pool, done, report)
         except KeyboardInterrupt as error:
+            pool.stop()
             held = sum(plan.chunk(k).runs for k in dataset.done(plan))
             complain(f"stopped: {held:,} of {plan.runs:,} runs are stored; continue with: {again}")
             raise typer.Exit(130) from error
@@ -204,8 +204,9 @@ def replay(
             "-o", "--output", metavar="DIR", show_default="results/DATASET-RUN", help="Folder for the results."
         ),
     ] = None,
-    plot: Annotated[bool, typer.Option(" /--no-plot", show_default=False, help="Draw no figures.")] = True,
+    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Draw figures.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
 ) -> None:
     """Simulate one run of a dataset again, with its trajectory and figures.
 
@@ -216,7 +217,7 @@ def replay(
     from springline.runner.plots import figure_files, run_figures
     from springline.runner.replay import differences, recorded, replayed
     from springline.runner.simulate import simulate
-    from springline.runner.storage import table_files, write_folder
+    from springline.runner.storage import table_files, units, write_folder
 
     source = Dataset(place(dataset))
     folder = output or Path("results", f"{Path(dataset).name}-{run}")
@@ -231,14 +232,18 @@ def replay(
     files |= table_files("trajectory", result.trajectory)
     files |= table_files("metrics", result.metrics)
     write_folder(folder, files, replaces=OUTPUTS)
-    print_metrics(result, scenario.system().joints)
-    say(result.message)
-    say(f"results: {folder}")
     wrong = differences(row, result.metrics)
+    if as_json:
+        print_json("replay", result.metrics.to_pylist(), units(result.metrics), result.status)
+    else:
+        print_metrics(result, scenario.system().joints)
+        say(result.message)
+        say(f"results: {folder}")
     if wrong:
         complain("the metrics are not those of the dataset:\n  " + "\n  ".join(wrong))
         raise typer.Exit(1)
-    say("the metrics are those of the dataset, bit for bit")
+    if not as_json:
+        say("the metrics are those of the dataset, bit for bit")
 
 
 def time_text(seconds: float) -> str:

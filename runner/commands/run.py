@@ -55,7 +55,7 @@ def run(
     ] = None,
     engine: Annotated[Engine, typer.Option(help="The engine.")] = Engine.lanes,
     form: Annotated[Format, typer.Option("--format", help="Format of the tables.")] = Format.parquet,
-    plot: Annotated[bool, typer.Option(" /--no-plot", show_default=False, help="Draw no figures.")] = True,
+    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Draw figures.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
 ) -> None:
@@ -63,12 +63,14 @@ def run(
 
     A run that diverges is a result: it is reported with the quantity and the time, and the exit code is 0.
     """
+    from springline.runner.locate import packaged_scenarios
     from springline.runner.scenario import load_scenario, parse_set
     from springline.runner.simulate import simulate
     from springline.runner.storage import table_files, units, write_folder
 
     loaded = load_scenario(scenario, dict(parse_set(change) for change in changes or []))
-    folder = output or Path("results", *Path(scenario).with_suffix("").parts[-2:])
+    packaged = scenario in packaged_scenarios()
+    folder = output or Path("results", scenario if packaged else Path(scenario).stem)
     refuse_occupied(folder, force=force)
     _refuse_own_inputs(folder, scenario, loaded)
     with progress(f"simulating {scenario}", quiet=as_json) as report:

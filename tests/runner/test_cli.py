@@ -517,3 +517,21 @@ def test_version_and_help_wait_for_no_library() -> None:
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.splitlines()[-1] == "[]"
+
+
+def test_default_folder_stays_below_results(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A packaged scenario's folder has its name; a file's has the file's own, wherever that lies."""
+    (elsewhere / "deep").mkdir()
+    text = "[simulation]\nduration = 0.01\n"
+    (elsewhere / "near.toml").write_text(text)
+    monkeypatch.chdir(elsewhere / "deep")
+    done("run", "../near.toml", "--no-plot")
+    assert (elsewhere / "deep" / "results" / "near" / "metrics.parquet").is_file()
+
+
+def test_a_trajectory_beyond_memory_is_refused(elsewhere: Path) -> None:
+    """The remedy names the key and a value that works."""
+    message = refused("run", "paper/nominal", "--set", "simulation.duration=1e5", "-o", "out", code=2)
+    assert "simulation.output_every" in message
+    assert "expected at least 100" in message
+    assert not Path("out").exists()

@@ -193,7 +193,6 @@ def test_fast_off_is_a_gain_of_zero_and_no_other_structure(load) -> None:
 
 def test_sampled_control_counts_steps(load) -> None:
     assert load('[control]\nmode = "sampled"\nperiod = 1e-3').control_every == 10
-    assert load('[control]\nmode = "continuous"\nperiod = 1e-3').control_every == 0
 
 
 def test_structure_comes_from_the_file(load) -> None:
@@ -286,6 +285,11 @@ def test_tables_are_found_beside_the_scenario(load, tmp_path: Path) -> None:
         pytest.param('[control]\nfast = "yes"', ["control.fast", "true or false"], id="truth"),
         pytest.param('[control]\nmode = "sampled"', ["control.period", "is missing", "a number > 0 [s]"], id="period"),
         pytest.param("[control]\nperiod = 0.1", ["control.period", 'mode = "sampled"'], id="mode forgotten"),
+        pytest.param(
+            '[control]\nmode = "continuous"\nperiod = 0.1',
+            ["control.period", 'mode = "sampled"'],
+            id="not sampled",
+        ),
         pytest.param(
             '[control]\nmode = "sampled"\nperiod = 2.5e-4',
             ["control.period", "whole multiple of simulation.step = 0.0001 s", "nearest is 0.0002 s"],
