@@ -88,6 +88,9 @@ typedef struct {{
 }} sl_time;
 
 enum {{ {enum} }};
+
+/* Evaluations stand by themselves: inlined into the loop they would share its registers, and spill them. */
+#define SL_EVALUATION static __attribute__((noinline, unused))
 """
 
 
@@ -121,13 +124,16 @@ def print_kernel(
     return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)
 
 
+def best_flags(compiler: toolchain.Compiler) -> tuple[str, ...]:
+    """Optimisation flags that make the fastest kernel with this compiler on this machine."""
+    flags = ("-O3", *toolchain.native_flags(compiler))
+    if compiler.family == "gcc":  # its scheduler before register allocation hides the latencies
+        flags += ("-fschedule-insns", "-fsched-pressure", "-mtune=generic")
+    return flags
+
+
 def _flags(options: KernelOptions) -> tuple[str, ...]:
-    wanted = options.flags
-    if wanted is None:
-        compiler = options.compiler or toolchain.find_compiler()
-        wanted = ("-O3", *toolchain.native_flags(compiler))
-        if compiler.family == "gcc":  # its scheduler before register allocation hides the latencies
-            wanted += ("-fschedule-insns", "-fsched-pressure", "-mtune=generic")
+    wanted = best_flags(options.compiler or toolchain.find_compiler()) if options.flags is None else options.flags
     return (*wanted, "-std=gnu99", "-fvisibility=hidden", "-Wno-unused-parameter", "-Wno-psabi")
 
 

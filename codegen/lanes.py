@@ -412,7 +412,7 @@ class _Emitter:
             )
             fast = [
                 f"/* {self.counts[name]} operations a run */",
-                f"static inline void kernel_{name}({arguments}) {{",
+                f"SL_EVALUATION void kernel_{name}({arguments}) {{",
                 *(f"  sl_m {mask} = slv_yes();" for mask in masks),
                 *lines,
                 f"  if (!SL_LIKELY(slv_all({' & '.join(masks)}))) kernel_{name}_checked({names});",

@@ -12,6 +12,7 @@ import numpy as np
 from springline.benchmarks import problem
 from springline.codegen import toolchain
 from springline.codegen.kernel import Kernel, KernelOptions, LoopSettings, kernel
+from springline.codegen.kernel_source import best_flags
 from springline.codegen.program import program
 from springline.model.system import SignalShape, Structure
 
@@ -71,7 +72,7 @@ def build(mode: problem.Control, options: KernelOptions, threads: int = 1) -> pr
 
 def build_fused(mode: problem.Control) -> problem.Runner:
     """The default, but free to fuse multiplications and additions: what equal bits on every machine cost."""
-    flags = ("-O3", *toolchain.native_flags(toolchain.find_compiler()), "-ffp-contract=fast")
+    flags = (*best_flags(toolchain.find_compiler()), "-ffp-contract=fast")
     return build(mode, replace(DEFAULT, flags=flags))
 
 

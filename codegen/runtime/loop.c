@@ -199,7 +199,7 @@ static void step_rk4(sl_pack *pack, int64_t k, const sl_time *times, sl_group *n
   }
 #pragma GCC unroll 1
   for (stage = 0; stage < 4; stage++) {
-    const sl_v advance = slv_set(stage < 3 ? node[stage + 1] * h : 0.0), gain = slv_set(weight[stage] * h);
+    const sl_v gain = slv_set(weight[stage] * h);
 #if SL_SAMPLED
     kernel_plant(times[when[stage]], (const sl_group *)at, (const sl_group *)pack->u, p, r, slope);
 #else
@@ -219,7 +219,12 @@ static void step_rk4(sl_pack *pack, int64_t k, const sl_time *times, sl_group *n
     for (i = 0; i < SL_NX; i++) {
       for (g = 0; g < SL_G; g++) {
         next[i][g] = next[i][g] + gain * slope[i][g];
-        at[i][g] = pack->x[i][g] + advance * slope[i][g];
+      }
+    }
+    if (stage < 3) {
+      const sl_v advance = slv_set(node[stage + 1] * h);
+      for (i = 0; i < SL_NX; i++) {
+        for (g = 0; g < SL_G; g++) at[i][g] = pack->x[i][g] + advance * slope[i][g];
       }
     }
   }
