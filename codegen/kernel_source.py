@@ -89,8 +89,12 @@ typedef struct {{
 
 enum {{ {enum} }};
 
-/* Evaluations stand by themselves: inlined into the loop they would share its registers, and spill them. */
+/* On vectors an evaluation stands by itself: inlined into the loop it would share its registers, and spill them. */
+#if SL_W > 1
 #define SL_EVALUATION static __attribute__((noinline, unused))
+#else
+#define SL_EVALUATION static inline
+#endif
 """
 
 
