@@ -51,6 +51,8 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
             there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
             raise InputError(Problem(name, "", "there is no such file", "", path.name, there))
         raise InputError(unknown(name, "", "file or packaged scenario", name, packaged_scenarios()))
+    if path.is_dir():
+        raise InputError(Problem(name, "", "is a folder: expected a TOML file or the name of a packaged scenario"))
     try:
         return path.read_text("utf-8-sig"), path.resolve().parent
     except (OSError, UnicodeDecodeError) as error:

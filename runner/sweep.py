@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -225,7 +225,8 @@ class _Reader:
         try:
             return load_scenario(path if path.is_file() else source, dict(_flattened(overrides)))
         except InputError as error:
-            self._problems += error.problems
+            there = f"{self._name}: scenario"
+            self._problems += [replace(problem, where=f"{there}: {problem.where}") for problem in error.problems]
             return None
 
     def _samples(self, document: Mapping[str, Any], method: Method, axes: Sequence[Axis]) -> int:

@@ -396,7 +396,7 @@ def test_unknown_scenarios_are_told(tmp_path: Path) -> None:
     (tmp_path / "arm.toml").touch()
     with pytest.raises(InputError, match=r"there is no such file; did you mean 'arm\.toml'"):
         load_scenario(tmp_path / "arn.toml")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is a folder: expected a TOML file"):
         load_scenario(tmp_path)
     (tmp_path / "latin.toml").write_bytes(b"# \xe4\n")
     with pytest.raises(InputError, match="UTF-8"):

@@ -320,3 +320,10 @@ def test_a_missing_file_suggests_the_packaged_sweeps() -> None:
 def test_an_unknown_scenario_is_named(write: Write) -> None:
     with pytest.raises(InputError, match="paper/nominal"):
         load_sweep(write("control.k1 = { uniform = [1, 2] }", scenario="paper/nominel"))
+
+
+def test_a_wrong_scenario_is_named_with_the_sweep_that_asks_for_it(tmp_path: Path) -> None:
+    path = tmp_path / "sweep.toml"
+    path.write_text('scenario = "paper/nominl"\nsamples = 4\n[vary]\n"control.delta" = { uniform = [0.03, 0.05] }\n')
+    with pytest.raises(InputError, match=r"sweep\.toml: scenario: .*paper/nominal"):
+        load_sweep(path)
