@@ -371,15 +371,13 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
     lengths = {key: len(values) for key, values in arrays.items()}
     if len(set(lengths.values())) != 1 or 0 in lengths.values():
         raise ValueError(f"the columns of a batch must be non-empty arrays of one length, got {lengths}")
-    values = scenario.values_for(arrays)
-    slots = scenario.system().slots
-    tunable = [slots[i].key for i in np.flatnonzero((values != values[0]).any(axis=0))]
-    work = work_for(scenario, tunable, values[0])
-    result = metrics_table(work.system.joints, _over_threads(work, work.chosen(values), jobs))
+    slots, runs = scenario.slots_for(arrays), max(lengths.values())
+    work = work_for(scenario, slots)
+    result = metrics_table(work.system.joints, _over_threads(work, work.chosen(slots, runs), jobs))
     keys = scenario.numeric_keys()
     for position, (key, array) in enumerate(arrays.items()):
         result = result.add_column(position, unit_field(key, keys[key].unit), pa.array(array))
-    return result.add_column(0, unit_field("run", "", pa.int64()), pa.array(np.arange(len(values))))
+    return result.add_column(0, unit_field("run", "", pa.int64()), pa.array(np.arange(runs)))
 
 
 def _over_threads(work: Work, parameters: Floats, jobs: int | None) -> Runs:

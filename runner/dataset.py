@@ -21,15 +21,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 from pyarrow import parquet
 
 from springline.codegen.manifest import canonical_json
 from springline.runner.errors import InputError, Problem
 from springline.runner.plan import Chunk, Plan
 from springline.runner.storage import TEMPORARY, parquet_bytes, write_file
+from springline.runner.toml_text import value_text
 
 DESCRIPTION = "sweep.json"
 TRAJECTORIES = "trajectories"
@@ -39,6 +38,7 @@ _PART = "part-{:06d}.parquet"
 # What may differ between the process that began a dataset and the one that resumes it.
 _FREE = ("springline", "versions")
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP)
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class Place(Protocol):
@@ -110,6 +110,8 @@ class Folder:
             return []
         except NotADirectoryError as error:
             raise InputError(Problem(self.name, "", "is a file: expected a folder for the dataset")) from error
+        except OSError as error:
+            raise _unusable(self.name, error) from error
 
     def read(self, name: str) -> bytes:
         """Content of a file."""
@@ -131,9 +133,18 @@ class Folder:
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the folder's lock, which the system drops with the process. Raises InputError if another has it."""
-        self._path.mkdir(parents=True, exist_ok=True)
-        with (self._path / _LOCK).open("a+") as file:
+        """Hold the folder's lock, which the system drops with the process.
+
+        Raises InputError if another has it or the folder cannot be written to, OSError if the disk is full.
+        """
+        try:
+            self._path.mkdir(parents=True, exist_ok=True)
+            lock = (self._path / _LOCK).open("a+")
+        except OSError as error:
+            if error.errno in _FULL:
+                raise
+            raise _unusable(self.name, error) from error
+        with lock as file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
@@ -224,6 +235,11 @@ def _is_gone(owner: str) -> bool:
     return False
 
 
+def _unusable(name: str, error: OSError) -> InputError:
+    text = f"cannot hold a dataset ({error.strerror}): -o must name a folder that can be made and written to"
+    return InputError(Problem(name, "", text))
+
+
 def _in_use(name: str, owner: str, hint: str = "") -> InputError:
     return InputError(Problem(name, "", f"is being written by {owner or 'another process'}{hint}"))
 
@@ -259,8 +275,10 @@ class Dataset:
         if isinstance(chunk, int) and chunk > 0 and plan.sweep.chunk in (0, chunk):
             plan = Plan(plan.sweep, chunk)
         new = json.loads(canonical_json(plan.as_json()))
-        old = {key: value for key, value in stored.items() if key not in _FREE}
-        changed = list(changes(old, new))
+        try:
+            changed = list(changes(_as_written(stored), _as_written(new)))
+        except (KeyError, TypeError, AttributeError, ValueError) as error:
+            raise InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({error!r})")) from error
         if changed:
             shown = "\n  ".join(changed[:20])
             text = f"cannot be resumed, for what it holds is not what the sweep asks for now:\n  {shown}"
@@ -318,16 +336,6 @@ class Dataset:
             # One thread: a column of a part is too little for more, and each would keep memory of its own.
             return parquet.read_table(file, columns=columns, use_threads=False)
 
-    def column(self, name: str, rows: int) -> NDArray[np.float64]:
-        """One column of numbers, (rows,), NaN for null, read part by part into one array."""
-        result = np.full(rows, np.nan)
-        filled = 0
-        for part in self.parts():
-            values = self.read_part(part, [name])[name].cast(pa.float64()).to_numpy()
-            result[filled : filled + len(values)] = values
-            filled += len(values)
-        return result[:filled]
-
 
 def read_dataset(destination: str | Path, columns: Sequence[str] | None = None) -> pa.Table:
     """All runs of a dataset, or some columns of them, as one table with units, in the order of the runs.
@@ -340,32 +348,36 @@ def read_dataset(destination: str | Path, columns: Sequence[str] | None = None) 
     return pa.concat_tables(dataset.read_part(name, columns) for name in dataset.parts())
 
 
+def _as_written(description: Mapping[str, Any]) -> dict[str, Any]:
+    """What sweep.json says, by the keys of a sweep and a scenario file; what follows from them last.
+
+    Raises KeyError, TypeError, AttributeError or ValueError if that cannot be told.
+    """
+    sweep = dict(description["sweep"])
+    vary = [{"key": axis["key"], **tomllib.loads(f"axis = {axis['axis']}")["axis"]} for axis in sweep.pop("vary")]
+    scenario = tomllib.loads(description["scenario"])
+    rest = {key: value for key, value in description.items() if key not in ("sweep", "scenario", *_FREE)}
+    return {**sweep, "vary": vary, **scenario, **rest}
+
+
 def changes(old: Any, new: Any, where: str = "") -> Iterator[str]:
-    """How plain data differ, a line for each place: "sweep.vary.control.delta.uniform: [0, 1] -> [0, 2]"."""
+    """How plain data differ, a line for each place, values in TOML: "vary.control.delta.uniform: [0, 1] -> [0, 2]"."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in dict.fromkeys([*old, *new]):
             yield from changes(old.get(key, _MISSING), new.get(key, _MISSING), f"{where}.{key}" if where else key)
     elif _is_keyed(old) and _is_keyed(new):
-        yield from changes({item["key"]: item for item in old}, {item["key"]: item for item in new}, where)
-        if (before := [item["key"] for item in old]) != (now := [item["key"] for item in new]):
+        yield from changes(_by_key(old), _by_key(new), where)
+        before, now = ([item["key"] for item in items] for items in (old, new))
+        if before != now and set(before) == set(now):
             yield f"{where}, order: {_shown(before)} -> {_shown(now)}"
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new) and any(map(_is_table, old)):
         for i, (a, b) in enumerate(zip(old, new, strict=True)):
             yield from changes(a, b, f"{where}.{i}")
-    elif where == "scenario" and isinstance(old, str) and isinstance(new, str):
-        yield from changes(_by_key(old), _by_key(new), where)
     elif old != new:
         yield f"{where}: {_shown(old)} -> {_shown(new)}"
 
 
-class _Missing:
-    """Stands for what is not there."""
-
-    def __repr__(self) -> str:
-        return "nothing"
-
-
-_MISSING = _Missing()
+_MISSING = object()  # stands for what is not there
 
 
 def _is_table(value: object) -> bool:
@@ -377,10 +389,10 @@ def _is_keyed(value: object) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(item, dict) and "key" in item for item in value)
 
 
-def _by_key(text: str) -> dict[str, Any]:
-    return tomllib.loads(text)
+def _by_key(items: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    return {item["key"]: {name: value for name, value in item.items() if name != "key"} for item in items}
 
 
 def _shown(value: object) -> str:
-    text = repr(value)
+    text = "nothing" if value is _MISSING or value is None else value_text(value)
     return text if len(text) <= 100 else f"{text[:97]}..."

@@ -39,7 +39,7 @@ MOST_GROUPS = 256
 _PACKS = 32
 _MOST_STEPS = 4e7
 _FEWEST_STEPS = 4e6
-_LARGEST_CHUNK = 4096
+_LARGEST_CHUNK = 2048
 _CHUNKS = 32
 _FEWEST_CHUNKS = 8
 _TRAJECTORY_BYTES = 64e6
@@ -64,7 +64,7 @@ class Group:
     row: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class Chunk:
     """Runs first .. first+runs-1, all of one group: one task, one part of the dataset."""
 
@@ -160,7 +160,7 @@ class Plan:
     def parameters(self, chunk: Chunk, columns: Columns) -> Floats:
         """The kernel's parameters of each run of a chunk with the given columns, (runs, parameters)."""
         numbers = {key: column for key, column in columns.items() if key in self._numeric}
-        return chunk.group.work.chosen(_values(chunk.group.scenario, numbers, chunk.runs))
+        return chunk.group.work.chosen(chunk.group.scenario.slots_for(numbers), chunk.runs)
 
     def scenario_of(self, run: int) -> Scenario:
         """The scenario of one run. Raises IndexError if there is no such run."""
@@ -293,10 +293,7 @@ class Plan:
         for axis in self._free:
             probes += [self._probe(start | {axis.key: extreme}) for extreme in self._extremes(axis)]
         columns = {key: np.array([probe[key] for probe in probes]) for key in probes[0]} if probes else {}
-        values = _values(scenario, columns, max(len(probes), 1))
-        slots = scenario.system().slots
-        tunable = [slots[i].key for i in np.flatnonzero((values != values[0]).any(axis=0))]
-        return work_for(scenario, tunable, values[0])
+        return work_for(scenario, scenario.slots_for(columns))
 
     def _extremes(self, axis: Axis) -> list[tuple[float, int]]:
         """Values that an axis takes, with their place in `values`: the ends, or all there are."""
@@ -411,11 +408,6 @@ class Plan:
             text = "no number that runs of one kernel may differ in: expected { values = [...] } or { each = [...] }"
             return [Problem(self.sweep.source, label, text, given_text(axis.as_toml()))]
         return []
-
-
-def _values(scenario: Scenario, columns: Mapping[str, NDArray[Any]], runs: int) -> Floats:
-    """Scenario.values_for, which also answers for no columns at all."""
-    return scenario.values_for(columns) if columns else np.tile(scenario.values(), (runs, 1))
 
 
 def _grid_values(axis: Axis) -> Floats:

@@ -29,6 +29,8 @@ from springline.runner.toml_text import document_text
 __all__ = ["NumericKey", "Scenario", "load_scenario", "packaged_scenarios", "parse_set"]
 
 Floats = NDArray[np.float64]
+Slots = dict[str, float | Floats]
+"""Slot key -> one number for all runs, or a column (runs,) of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,35 +158,20 @@ class Scenario:
         "mechanism.m3" moves the controller's value, and the plant's unless the plant has its own; "plant.m3" and
         "plant.m3.scale" move the plant's alone; "control.mu" moves all joints, "control.mu.0" one.
         """
-        system, keys = self.system(), {}
-        groups: dict[str, list[str]] = {}
-        given = system.structure.initial_motor == "given"
-        for slot in system.slots:
-            if slot.key.startswith("initial.q_motor.") and not given:
-                continue
-            unit = schema.unit_text(slot.unit, system.joints)
-            keys[slot.key] = NumericKey(unit, slot.bounds, slot.meaning, (slot.key,))
-            if slot.key.startswith("plant."):
-                scale = scale_key(slot.key)
-                keys[scale] = NumericKey("1", POSITIVE, f"{slot.meaning}, as a factor on the controller's", (scale,))
-        for key in keys:
-            stem, _, last = key.rpartition(".")
-            if last.isdigit():
-                groups.setdefault(stem, []).append(key)
-        for stem, leaves in groups.items():
-            units = " or ".join(dict.fromkeys(keys[leaf].unit for leaf in leaves))
-            first = keys[leaves[0]]
-            meaning = first.meaning.rpartition(" (")[0]
-            keys[stem] = NumericKey(units, first.bounds, f"{meaning} (all joints)", tuple(leaves))
-        return keys
+        return dict(_numeric_keys(self.structure()))
 
     def values_for(self, columns: Mapping[str, ArrayLike]) -> Floats:
-        """One parameter vector a run, (runs, slots): `columns` holds one number a run for each of its numeric keys.
+        """One parameter vector a run, (runs, slots), with `columns` as for `slots_for`; one run if there are none."""
+        slots = self.slots_for(columns)
+        return per_run(slots, list(slots), max(np.size(values) for values in slots.values()))
+
+    def slots_for(self, columns: Mapping[str, ArrayLike]) -> Slots:
+        """What each slot is, in the order of System.slots: `columns` holds one number a run for each numeric key.
 
         Where two keys set the same entry, the later one counts.
         Raises InputError for an unknown key, a value out of bounds, and columns of different lengths.
         """
-        keys, problems = self.numeric_keys(), []
+        keys, problems = _numeric_keys(self.structure()), []
         numbers: dict[str, float | Floats] = dict(self._numbers)
         runs = 1
         for name, values in columns.items():
@@ -208,11 +195,7 @@ class Scenario:
                 numbers[leaf] = column
         if problems:
             raise InputError(*problems)
-        slots = self.system().slots
-        result = np.empty((runs, len(slots)))
-        for i, slot in enumerate(slots):
-            result[:, i] = self._slot(slot.key, numbers)
-        return result
+        return {slot.key: self._slot(slot.key, numbers) for slot in self.system().slots}
 
     @cached_property
     def _numbers(self) -> dict[str, float]:
@@ -304,6 +287,39 @@ def parse_set(text: str) -> tuple[str, object]:
 @lru_cache(maxsize=64)
 def _system(structure: Structure) -> System:
     return System(structure)
+
+
+def per_run(slots: Slots, keys: Sequence[str], runs: int) -> Floats:
+    """Some slots of each run, (runs, keys)."""
+    result = np.empty((runs, len(keys)))
+    for column, key in zip(result.T, keys, strict=True):
+        column[:] = slots[key]
+    return result
+
+
+@lru_cache(maxsize=64)
+def _numeric_keys(structure: Structure) -> dict[str, NumericKey]:
+    """The numeric keys of a structure; who asks for every chunk of a sweep gets the same."""
+    system, keys = _system(structure), {}
+    groups: dict[str, list[str]] = {}
+    for slot in system.slots:
+        if slot.key.startswith("initial.q_motor.") and structure.initial_motor != "given":
+            continue
+        unit = schema.unit_text(slot.unit, system.joints)
+        keys[slot.key] = NumericKey(unit, slot.bounds, slot.meaning, (slot.key,))
+        if slot.key.startswith("plant."):
+            scale = scale_key(slot.key)
+            keys[scale] = NumericKey("1", POSITIVE, f"{slot.meaning}, as a factor on the controller's", (scale,))
+    for key in keys:
+        stem, _, last = key.rpartition(".")
+        if last.isdigit():
+            groups.setdefault(stem, []).append(key)
+    for stem, leaves in groups.items():
+        units = " or ".join(dict.fromkeys(keys[leaf].unit for leaf in leaves))
+        first = keys[leaves[0]]
+        meaning = first.meaning.rpartition(" (")[0]
+        keys[stem] = NumericKey(units, first.bounds, f"{meaning} (all joints)", tuple(leaves))
+    return keys
 
 
 def _shape(table: Mapping[str, Any], coordinates: Sequence[str]) -> SignalShape:

@@ -14,11 +14,14 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
+from pyarrow import compute
 
 from springline.codegen.kernel import METRICS, STATUS
+from springline.model.parameters import Joint
 from springline.runner import sampling
 from springline.runner.dataset import Dataset
-from springline.runner.plan import Plan
+from springline.runner.plan import Chunk, Plan
+from springline.runner.quantiles import Quantiles
 from springline.runner.storage import units
 from springline.runner.toml_text import value_text
 
@@ -64,70 +67,87 @@ class Summary:
 
 def summarize(plan: Plan, dataset: Dataset) -> Summary:
     """The Summary of the parts that are there. Raises ValueError if there are none."""
-    parts = dataset.parts()
-    if not parts:
+    chunks = [plan.chunk(number) for number in sorted(dataset.done(plan))]
+    if not chunks:
         raise ValueError("no runs to summarize")
-    columns = [f"{metric}_{joint.name}" for metric in METRICS for joint in plan.groups[0].work.system.joints]
-    metrics, runs = {}, 0
-    for column in columns:
-        values = dataset.column(column, plan.runs)
-        runs = len(values)
-        metrics[column] = _distribution(values)
-    errors = {column: metrics[column] for column in columns if column.startswith("steady_state_error_")}
-    scales = {column: item.quantiles[QUANTILES.index(0.5)] or 1.0 for column, item in errors.items()}
-
+    runs = sum(chunk.runs for chunk in chunks)
+    parts = [dataset.part_name(chunk.number) for chunk in chunks]
     names = group_names(plan)
     outcomes = {name: dict.fromkeys(_OUTCOMES, 0) for name in names}
-    edges = np.array([group.first for group in plan.groups])
-    worst: list[tuple[float, int, dict[str, Any]]] = []
-    shown = []
-    for part in parts:
+    # Gathered as arrays of their final length: small tables would be many, and each a hole in the memory.
+    rows = sum(np.count_nonzero(_picked(chunk, runs)) for chunk in chunks)
+    gathered = {field.name: np.empty(rows, field.type.to_pandas_dtype()) for field in plan.schema}
+    row = 0
+    for chunk, part in zip(chunks, parts, strict=True):
         table = dataset.read_part(part)
-        run = table["run"].to_numpy()
-        status = np.array(table["status"].to_pylist())
-        groups = np.searchsorted(edges, run, side="right") - 1
-        for group in np.unique(groups):
-            for outcome in _OUTCOMES:
-                outcomes[names[group]][outcome] += int(np.count_nonzero(status[groups == group] == outcome))
-        worst = heapq.nlargest(WORST, chain(worst, _scored(table, status, scales)), key=lambda item: item[:2])
-        picked = _picked(run, runs)
-        if picked.any():
-            shown.append(table.filter(pa.array(picked)))
-    table = pa.concat_tables(shown).combine_chunks() if shown else plan.schema.empty_table()
-    return Summary(runs, outcomes, metrics, units(table), [row for _, _, row in worst], table)
+        for outcome in _OUTCOMES:
+            outcomes[names[chunk.group.number]][outcome] += int(np.count_nonzero(_ended(table, outcome)))
+        picked = table.filter(pa.array(_picked(chunk, runs)))
+        for name, column in gathered.items():
+            column[row : row + len(picked)] = picked[name].to_numpy()
+        row += len(picked)
+    shown = pa.table([pa.array(gathered.pop(f.name), f.type, from_pandas=True) for f in plan.schema], plan.schema)
+    metrics = _distributions(dataset, parts, shown, plan.groups[0].work.system.joints)
+    return Summary(runs, outcomes, metrics, units(shown), _worst(dataset, parts, metrics), shown)
 
 
-def _distribution(values: Floats) -> Distribution:
-    """Quantiles by the nearest rank; sorts in place, for a copy of a long column would be felt."""
-    count = int(np.count_nonzero(~np.isnan(values)))
-    if count == 0:
-        return Distribution((float("nan"),) * len(QUANTILES), 1.0)
-    values.sort()  # NaN last
-    places = [round(q * (count - 1)) for q in QUANTILES]
-    return Distribution(tuple(float(values[place]) for place in places), 1.0 - count / len(values))
+def _distributions(
+    dataset: Dataset, parts: Sequence[str], sample: pa.Table, joints: Sequence[Joint]
+) -> dict[str, Distribution]:
+    """What is to be said of each metric."""
+    columns = [f"{metric}_{joint.name}" for metric in METRICS for joint in joints]
+    quantiles = {column: Quantiles(QUANTILES, _numbers(sample, column)) for column in columns}
+    runs = 0
+    for part in parts:
+        table = dataset.read_part(part, columns)
+        runs += len(table)
+        for column in columns:
+            quantiles[column].count(_numbers(table, column))
+    for part in parts:
+        table = dataset.read_part(part, columns)
+        for column in columns:
+            quantiles[column].gather(_numbers(table, column))
+    return {column: Distribution(item.values(), 1.0 - item.known / runs) for column, item in quantiles.items()}
 
 
-def _scored(
-    table: pa.Table, status: NDArray[Any], scales: Mapping[str, float]
-) -> Iterator[tuple[float, int, dict[str, Any]]]:
+def _worst(dataset: Dataset, parts: Sequence[str], metrics: Mapping[str, Distribution]) -> list[dict[str, Any]]:
+    """The worst rows of the dataset. Steady-state errors of several joints compare as shares of their medians."""
+    errors = {column: item for column, item in metrics.items() if column.startswith("steady_state_error_")}
+    scales = {column: item.quantiles[QUANTILES.index(0.5)] or 1.0 for column, item in errors.items()}
+    worst: list[tuple[float, int, dict[str, Any]]] = []
+    for part in parts:
+        scored = _scored(dataset.read_part(part), scales)
+        worst = heapq.nlargest(WORST, chain(worst, scored), key=lambda item: item[:2])
+    return [row for _, _, row in worst]
+
+
+def _numbers(table: pa.Table, column: str) -> Floats:
+    """A column of numbers, NaN for null."""
+    return np.asarray(table[column].to_numpy(), dtype=np.float64)
+
+
+def _ended(table: pa.Table, outcome: str) -> NDArray[np.bool_]:
+    """Which runs ended so."""
+    return np.asarray(compute.equal(table["status"], outcome).to_numpy(), dtype=np.bool_)
+
+
+def _scored(table: pa.Table, scales: Mapping[str, float]) -> Iterator[tuple[float, int, dict[str, Any]]]:
     """The worst rows of a part: (badness, -run, row). A run that stopped is worse than any that did not."""
-    error = np.zeros(len(status))
+    error = np.zeros(len(table))
     for column, scale in scales.items():
-        values = table[column].to_numpy()
-        error = np.fmax(error, values / scale)
-    end = table["t_end"].to_numpy()
-    badness = np.where(status == "ok", np.arctan(error), 10.0 + 1.0 / (1.0 + end))
+        error = np.fmax(error, _numbers(table, column) / scale)
+    end = _numbers(table, "t_end")
+    badness = np.where(_ended(table, "ok"), np.arctan(error), 10.0 + 1.0 / (1.0 + end))
     for row in np.argsort(-badness, kind="stable")[:WORST]:
         content = table.slice(int(row), 1).to_pylist()[0]
         yield float(badness[row]), -int(content["run"]), content
 
 
-def _picked(run: NDArray[np.int64], runs: int) -> NDArray[np.bool_]:
-    """Which runs figures show: all, or a random choice that does not depend on how they are cut into parts."""
+def _picked(chunk: Chunk, runs: int) -> NDArray[np.bool_]:
+    """Which runs of a chunk figures show: all, or a random choice that does not depend on how runs are cut."""
     if runs <= _SHOWN:
-        return np.ones(len(run), dtype=np.bool_)
-    first = int(run[0])
-    return np.asarray(sampling.random(0, "figures", first, int(run[-1]) - first + 1)[run - first] < _SHOWN / runs)
+        return np.ones(chunk.runs, dtype=np.bool_)
+    return np.asarray(sampling.random(0, "figures", chunk.first, chunk.runs) < _SHOWN / runs)
 
 
 def group_names(plan: Plan) -> list[str]:

@@ -24,7 +24,7 @@ from springline.codegen.kernel_source import KernelOptions, KernelSource, print_
 from springline.codegen.manifest import canonical_json
 from springline.codegen.program import program
 from springline.model.system import Structure, System
-from springline.runner.scenario import Scenario
+from springline.runner.scenario import Scenario, Slots, per_run
 from springline.runner.simulate import kernel_tables, loop_settings
 
 Floats = NDArray[np.float64]
@@ -74,13 +74,12 @@ class Work:
         with _COMPILING:
             return kernel(self.structure, self.sampled, self.options, self.baked)
 
-    def chosen(self, values: Floats) -> Floats:
-        """The columns (runs, parameters) of `values` (runs, slots) that a run takes."""
-        keys = [slot.key for slot in self.system.slots]
-        fixed = np.array([key not in self.tunable for key in keys])
-        if not (values[:, fixed] == np.array(self.baked)[fixed]).all():
-            raise AssertionError("a slot that was taken for constant varies")
-        return values[:, [keys.index(key) for key in self.parameters]]
+    def chosen(self, slots: Slots, runs: int) -> Floats:
+        """What each run takes of `slots`, (runs, parameters)."""
+        for slot, baked in zip(self.system.slots, self.baked, strict=True):
+            if slot.key not in self.tunable and not np.all(slots[slot.key] == baked):
+                raise AssertionError(f"{slot.key}, which was taken for constant, varies")
+        return per_run(slots, self.parameters, runs)
 
 
 # Several threads want the first chunk's kernel at once, and CasADi is not made for that.
@@ -98,13 +97,13 @@ def _emitted(
     return sha256(text).hexdigest(), emission.tunable
 
 
-def work_for(scenario: Scenario, tunable: Sequence[str], values: Floats) -> Work:
-    """The Work of a scenario: `values` (slots,) are those of all slots, of which `tunable` may vary."""
+def work_for(scenario: Scenario, slots: Slots) -> Work:
+    """The Work of a scenario's runs: a slot in which they differ is tunable, any other is baked."""
     return Work(
         scenario.structure(),
         scenario.control_every > 0,
-        tuple(tunable),
-        tuple(float(value) for value in values),
+        tuple(key for key, values in slots.items() if np.any(values != np.ravel(values)[0])),
+        tuple(float(np.ravel(values)[0]) for values in slots.values()),
         loop_settings(scenario, trajectory=True),
         tuple(kernel_tables(scenario.tables())),
     )

@@ -24,10 +24,11 @@ if TYPE_CHECKING:
 _LONG = 3600.0
 _LARGE = 10e9
 _SHOWN_KEYS = 5
+_PACKAGED = "gains, laws, payload_and_phase, stability_map"  # here, for the help must not load all that lists them
 
 
 def batch(
-    sweep: Annotated[str, typer.Argument(help="A TOML file, or a packaged sweep: stability_map.")],
+    sweep: Annotated[str, typer.Argument(help=f"A TOML file, or a packaged sweep: {_PACKAGED}.")],
     output: Annotated[
         str,
         typer.Option(
@@ -148,17 +149,24 @@ def _finish(plan: Plan, dataset: Dataset, tally: Tally, again: str, *, plot: boo
 
 def write_summary(plan: Plan, dataset: Dataset, summary: Summary, *, plot: bool = True) -> None:
     """summary.md and its figures beside the parts."""
-    from springline.runner.plots import figure_files
     from springline.runner.summary import markdown
+
+    names = _write_figures(plan, dataset, summary) if plot else []
+    title = Path(plan.sweep.source).stem
+    dataset.place.write("summary.md", markdown(plan, summary, names, title).encode())
+
+
+def _write_figures(plan: Plan, dataset: Dataset, summary: Summary) -> list[str]:
+    """The figures of a dataset; their names in summary.md."""
+    from springline.runner.plots import figure_files  # a quarter of a small sweep's memory is matplotlib's
     from springline.runner.sweep_plots import summary_figures
 
     names = []
-    for name, figure in (summary_figures(plan, summary) if plot else {}).items():
+    for name, figure in summary_figures(plan, summary).items():
         for file, content in figure_files(name, figure).items():
             dataset.place.write(file, content)
         names.append(f"{name}.png")
-    title = Path(plan.sweep.source).stem
-    dataset.place.write("summary.md", markdown(plan, summary, names, title).encode())
+    return names
 
 
 @contextmanager

@@ -3,9 +3,12 @@
 import importlib
 import importlib.util
 import json
+import math
 import os
 import re
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
@@ -18,6 +21,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pyarrow import parquet
 from scipy.stats import spearmanr
 from typer.testing import CliRunner
@@ -30,9 +35,10 @@ from springline.runner.commands.batch import size_text, time_text
 from springline.runner.dataset import Dataset, place, read_dataset
 from springline.runner.errors import InputError
 from springline.runner.plan import Plan
+from springline.runner.quantiles import Quantiles
 from springline.runner.replay import stored_plan
 from springline.runner.summary import QUANTILES, summarize
-from springline.runner.sweep import load_sweep
+from springline.runner.sweep import load_sweep, packaged_sweeps
 from springline.runner.sweep_plots import rank_correlation
 from springline.runner.work import parcel, perform_parcel
 
@@ -323,6 +329,19 @@ def test_batch_writes_a_dataset_with_its_summary(sweep: Path, tmp_path: Path, co
     assert re.fullmatch("[0-9a-f]{64}", stored["groups"][0]["kernel"])
 
 
+def test_the_packaged_sweeps_are_named_in_the_help(command: Command) -> None:
+    said = " ".join(command("batch", "--help").stdout.split())
+    assert f"a packaged sweep: {', '.join(packaged_sweeps())}." in said
+
+
+def test_without_figures_the_library_that_draws_them_is_not_loaded(sweep: Path, tmp_path: Path) -> None:
+    code = "import sys; from springline.runner.cli import app; app(standalone_mode=False); print(*sys.modules)"
+    words = [sys.executable, "-c", code, "batch", sweep, "-o", tmp_path / "data", "--no-plot"]
+    modules = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    assert "pyarrow" in modules
+    assert "matplotlib" not in modules
+
+
 def test_replay_is_bit_identical_and_notices_what_is_not(sweep: Path, tmp_path: Path, command: Command) -> None:
     """Over a grid, whose numbering depends on the order of its axes, here not the alphabetical one."""
     vary = "control.k1 = { values = [1.0, 2.0, 3.0] }\ncontrol.delta = { log_uniform = [0.02, 0.1], points = 12 }\n"
@@ -421,6 +440,67 @@ def test_summary_numbers_are_those_of_the_table(tmp_path: Path) -> None:
     assert found.metrics["steady_state_error_lift"].missing == pytest.approx(missing)
     first = np.sort(table["t_end"].to_numpy()[status != "ok"])[: len(found.worst)]
     assert [row["t_end"] for row in found.worst][: len(first)] == list(first)
+
+
+def test_quantiles_are_exact_whatever_the_sample_that_figures_show(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "sweep.toml"
+    file.write_text(SWEEP.replace("samples = 300", "samples = 4000"), encoding="utf-8")
+    run(file, tmp_path / "data", chunk=96)
+    dataset, table = Dataset(place(tmp_path / "data")), read_dataset(tmp_path / "data")
+    plan = stored_plan(dataset)
+    whole = summarize(plan, dataset)
+    assert whole.shown.equals(table, check_metadata=True)
+    for column, found in whole.metrics.items():
+        numbers = np.sort(table[column].drop_null().to_numpy())
+        expected = [numbers[round(q * (len(numbers) - 1))] for q in QUANTILES] if len(numbers) else [math.nan] * 7
+        assert np.array_equal(found.quantiles, expected, equal_nan=True), column
+    monkeypatch.setattr("springline.runner.summary._SHOWN", 100)
+    sampled = summarize(plan, dataset)
+    assert 50 < len(sampled.shown) < 200
+    assert set(sampled.shown["run"].to_pylist()) < set(range(4000))
+    assert repr(sampled.metrics) == repr(whole.metrics)
+    assert (sampled.outcomes, repr(sampled.worst)) == (whole.outcomes, repr(whole.worst))
+
+
+def test_a_damaged_part_is_not_summarized(sweep: Path, tmp_path: Path) -> None:
+    run(sweep, tmp_path / "data", chunk=100)
+    part = tmp_path / "data" / "part-000001.parquet"
+    part.write_bytes(part.read_bytes()[:-10])
+    dataset = Dataset(place(tmp_path / "data"))
+    assert summarize(stored_plan(dataset), dataset).runs == 200
+
+
+@given(
+    st.lists(st.sampled_from([math.nan, -1.0, 0.0, 1.0, math.inf]) | st.floats(), max_size=200),
+    st.lists(st.floats(), max_size=5),
+    st.integers(1, 7),
+)
+def test_quantiles_of_any_numbers_with_any_sample_are_those_of_the_sorted_ones(
+    numbers: list[float], sample: list[float], cuts: int
+) -> None:
+    values = np.array(numbers, dtype=np.float64)
+    found = Quantiles(QUANTILES, np.array([*sample, *numbers[::9]], dtype=np.float64))
+    for part in np.array_split(values, cuts):
+        found.count(part)
+    for part in np.array_split(values, cuts):
+        found.gather(part)
+    known = np.sort(values[~np.isnan(values)])
+    assert found.known == len(known)
+    expected = [known[round(q * (len(known) - 1))] for q in QUANTILES] if len(known) else [math.nan] * 7
+    assert np.array_equal(found.values(), expected, equal_nan=True)
+
+
+def test_few_numbers_are_gathered_for_a_quantile() -> None:
+    rng = np.random.default_rng(1)
+    values = np.concatenate([rng.lognormal(size=100_000), np.full(100_000, 0.25)])
+    found = Quantiles(QUANTILES, rng.choice(values, 5000))
+    found.count(values)
+    found.gather(values)
+    known = np.sort(values)
+    assert found.values() == tuple(known[round(q * (len(known) - 1))] for q in QUANTILES)
+    assert 0 < sum(map(len, found._gathered.values())) < 20_000
 
 
 def test_rank_correlation_is_spearmans_within_groups() -> None:

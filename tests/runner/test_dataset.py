@@ -88,11 +88,12 @@ def test_resume_of_nothing_begins(write: Callable[..., Path], tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (("seed = 2", "seed = 3"), "sweep.seed: 2 -> 3"),
-        (("[1.0, 5.0]", "[1.0, 6.0]"), r"control\.k1\.axis: .*5\.0.* -> .*6\.0"),
-        (("control.k1 =", "control.k2 ="), r"control\.k1.*-> nothing"),
-        (("0.002\n", "0.003\n"), r"scenario\.simulation\.duration: 0\.002 -> 0\.003"),
-        (("samples = 300", "samples = 299"), "runs: 300 -> 299"),
+        (("seed = 2", "seed = 3"), "\n  seed: 2 -> 3"),
+        (("[1.0, 5.0]", "[1.0, 6.0]"), r"\n  vary\.control\.k1\.uniform: \[1\.0, 5\.0\] -> \[1\.0, 6\.0\]"),
+        (("control.k1 =", "control.k2 ="), r"\n  vary\.control\.k1: \{ uniform = \[1\.0, 5\.0\] \} -> nothing"),
+        (("0.002\n", "0.003\n"), r"\n  simulation\.duration: 0\.002 -> 0\.003"),
+        (("0.002\n", "0.002\ncontrol.fast = false\n"), r"\n  control\.fast: true -> false"),
+        (("samples = 300", "samples = 299"), "\n  samples: 300 -> 299"),
         (("chunk = 32", "chunk = 64"), "chunk: 32 -> 64"),
     ],
 )
@@ -115,7 +116,7 @@ def test_resume_refuses_another_kernel_but_not_another_version(write: Callable[.
     assert run(write(), folder, resume=True).done == 0
     stored["groups"][0]["kernel"] = "0" * 64
     file.write_text(json.dumps(stored), encoding="utf-8")
-    with pytest.raises(InputError, match=r"groups\.0\.kernel: '000"):
+    with pytest.raises(InputError, match=r'groups\.0\.kernel: "000'):
         run(write(), folder, resume=True)
 
 
@@ -153,16 +154,40 @@ def test_a_file_in_place_of_the_folder_is_named(write: Callable[..., Path], tmp_
         batch(str(write()), output=str(tmp_path / "sweep.toml"))
 
 
+@pytest.mark.parametrize("name", ["/proc/springline/data", "n" * 300])
+def test_a_folder_that_cannot_be_made_is_the_users_mistake(
+    write: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"cannot hold a dataset \(.+\): -o must name a folder"):
+        batch(str(write()), output=name)
+
+
+@pytest.mark.parametrize("key", ["sweep", "scenario"])
+def test_a_damaged_description_is_told(write: Callable[..., Path], tmp_path: Path, key: str) -> None:
+    folder = tmp_path / "data"
+    run(write(), folder)
+    stored = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    for damaged in ({k: v for k, v in stored.items() if k != key}, stored | {key: "]"}, stored | {key: None}):
+        (folder / "sweep.json").write_text(json.dumps(damaged), encoding="utf-8")
+        with pytest.raises(InputError, match=r"sweep\.json: is damaged"):
+            run(write(), folder, resume=True)
+
+
 def test_changes_are_told_by_place() -> None:
     old = {"a": 1, "l": [{"key": "x", "v": 1}, {"key": "y", "v": 2}], "gone": True}
     new = {"a": 2, "l": [{"key": "y", "v": 2}, {"key": "x", "v": 3}], "new": [1]}
     assert set(changes(old, new)) == {
         "a: 1 -> 2",
         "l.x.v: 1 -> 3",
-        "l, order: ['x', 'y'] -> ['y', 'x']",
-        "gone: True -> nothing",
+        'l, order: ["x", "y"] -> ["y", "x"]',
+        "gone: true -> nothing",
         "new: nothing -> [1]",
     }
+    assert list(changes({"l": [{"key": "x", "v": 1}]}, {"l": [{"key": "y", "v": 1}]})) == [
+        "l.x: { v = 1 } -> nothing",
+        "l.y: nothing -> { v = 1 }",
+    ]
 
 
 # --- URLs ------------------------------------------------------------------------------------------------
