@@ -55,8 +55,8 @@ class Effort:
     compilers  whether to time them, which takes two processes each
     """
 
-    rounds: int = 15
-    sample: float = 0.06
+    rounds: int = 60
+    sample: float = 0.015
     patience: float = 3.0
     adaptive: int = problem.STEPS
     compared: int = problem.PREFIX
@@ -64,7 +64,7 @@ class Effort:
     compilers: bool = True
 
 
-QUICK = Effort(rounds=5, sample=0.03, patience=0.5, adaptive=problem.PREFIX, comparison=0.2, compilers=False)
+QUICK = Effort(rounds=10, sample=0.015, patience=0.5, adaptive=problem.PREFIX, comparison=0.2, compilers=False)
 
 
 @dataclass

@@ -150,7 +150,7 @@ class Kernel:
 
     program     what it was printed from
     parameters  slot keys in the order of the columns that `run` takes
-    width       runs that are simulated together (lanes x groups)
+    width       runs that are simulated together (lanes x groups x packs)
     library     the shared library, in the cache
     """
 

@@ -26,6 +26,7 @@ class KernelOptions:
     engine   "lanes" or "casadi" (the reference, one run at a time, every parameter tunable)
     width    lanes in a vector, None for the machine's
     groups   vectors worked on at once to hide latency, None for what pays
+    packs    so many times width x groups runs go through time side by side, None for what pays
     tunable  slot keys that each run may set for itself, None for all; the others are baked
     flags    optimisation flags, None for the best this machine can do
     compiler  None for the one that is found
@@ -34,6 +35,7 @@ class KernelOptions:
     engine: Engine = "lanes"
     width: int | None = None
     groups: int | None = None
+    packs: int | None = None
     tunable: tuple[str, ...] | None = None
     flags: tuple[str, ...] | None = None
     compiler: toolchain.Compiler | None = None
@@ -58,7 +60,7 @@ class KernelSource:
         return hashlib.sha256(json.dumps([self.files, self.parameters]).encode()).hexdigest()
 
 
-def preamble(program: Program, *, width: int, groups: int, sampled: bool, sizes: Mapping[str, int]) -> str:
+def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: bool, sizes: Mapping[str, int]) -> str:
     """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
     channels = sum(len(table.channels) for table in program.system.tables)
     numbers = {
@@ -76,6 +78,7 @@ def preamble(program: Program, *, width: int, groups: int, sampled: bool, sizes:
     enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
     return f"""#define SL_W {width}
 #define SL_G {groups}
+#define SL_PACKS {packs}
 #define SL_SAMPLED {int(sampled)}
 #include "sl_lanes.h"
 
@@ -110,7 +113,7 @@ def print_kernel(
     slots, size = program.system.slots, program.size
     if options.engine == "casadi":
         sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
-        start = preamble(program, width=1, groups=1, sampled=sampled, sizes=sizes)
+        start = preamble(program, width=1, groups=1, packs=1, sampled=sampled, sizes=sizes)
         parameters = tuple(slot.key for slot in slots)
         files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}
     else:
@@ -121,8 +124,10 @@ def print_kernel(
             constants = {slot.key: value for slot, value in pairs if slot.key not in tunable}
         width = options.width or toolchain.native_vector_width(options.compiler)
         groups = options.groups or (2 if width > 1 else 1)
+        # The plant alone is a short evaluation and a long chain: others have to fill its gaps.
+        packs = options.packs or (2 if sampled and width > 1 else 1)
         emission = lanes.emit(program, constants, groups)
-        start = preamble(program, width=width, groups=groups, sampled=sampled, sizes=emission.sizes)
+        start = preamble(program, width=width, groups=groups, packs=packs, sampled=sampled, sizes=emission.sizes)
         parameters = emission.tunable
         files = {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}"}
     return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)

@@ -1,8 +1,9 @@
 /*
- * loop.c - fixed-step simulation of a pack of runs; compiled together with its kernel.
+ * loop.c - fixed-step simulation of packs of runs; compiled together with its kernel.
  *
- * A pack is SL_G groups of SL_W lanes, a lane is one run. "kernel.h" comes from a generator and provides
- *   sizes        SL_W SL_G; SL_NJ joints, SL_NX states, SL_NB base coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV
+ * A pack is SL_G groups of SL_W lanes, a lane is one run; SL_PACKS packs go through time side by side. "kernel.h" comes
+ * from a generator and provides
+ *   sizes        SL_W SL_G SL_PACKS; SL_NJ joints, SL_NX states, SL_NB base coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV
  *                (values bound once per run; once per time and the same for all runs; once per time and run),
  *                SL_ND, SL_NTABLES, SL_TABLE_CHANNELS; SL_SAMPLED 0 or 1
  *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals
@@ -11,6 +12,7 @@
  */
 #include <float.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "kernel.h"
 #include "metrics.h"
@@ -82,9 +84,11 @@ typedef struct {
   unsigned char alive[SL_PACK];
   sl_group p[SL_NP + 1], r[SL_NR + 1];
   sl_group x[SL_NX], u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
-  sl_group varying[3][SL_NV + 1];
+  sl_group at[SL_NX], next[SL_NX]; /* where a stage is evaluated, and the next state as far as it is summed up */
+  sl_time times[3];                /* the beginning, middle and end of the step */
+  sl_group varying[3][SL_NV + 1];  /* what varies at these times, in turn */
   sl_metrics metrics[SL_NJ][SL_G];
-  sl_clock clock;
+  sl_clock *clock;
 } sl_pack;
 
 static double lane_of(const sl_v *group, int lane) { return slv_get(group[lane / SL_W], lane % SL_W); }
@@ -95,7 +99,7 @@ static void set_lane(sl_v *group, int lane, double value) {
 
 static sl_time time_at(sl_pack *pack, int64_t j, sl_group *varying) {
   sl_time now;
-  now.uniform = uniform_at(&pack->clock, j);
+  now.uniform = uniform_at(pack->clock, j);
   now.varying = (const sl_group *)varying;
   if (SL_NV > 0) {
     double d[SL_ND + 1];
@@ -149,18 +153,18 @@ static void finish_lane(sl_pack *pack, int lane, int64_t k, enum sl_status statu
  * Ends the runs whose next state is not finite or out of bounds; they keep the state of step k. Their lanes go on from
  * zero, so that what they compute stays harmless.
  */
-static void stop_runaways(sl_pack *pack, int64_t k, sl_group *next, double bound, sl_time now) {
+static void stop_runaways(sl_pack *pack, int64_t k, double bound) {
   const int between_rows = pack->job->output_every > 0 && k % pack->job->output_every != 0;
   int lane, i, bad;
   for (lane = 0; lane < SL_PACK; lane++) {
-    for (bad = 0; bad < SL_NX && sl_fabs(lane_of(next[bad], lane)) <= bound; bad++) continue;
+    for (bad = 0; bad < SL_NX && sl_fabs(lane_of(pack->next[bad], lane)) <= bound; bad++) continue;
     if (bad == SL_NX) continue;
     if (pack->alive[lane]) {
-      const double value = sl_fabs(lane_of(next[bad], lane));
-      if (between_rows) write_row(pack, k, now, lane, lane + 1);
+      const double value = sl_fabs(lane_of(pack->next[bad], lane));
+      if (between_rows) write_row(pack, k, pack->times[0], lane, lane + 1);
       finish_lane(pack, lane, k, value <= DBL_MAX ? SL_OUT_OF_BOUNDS : SL_DIVERGED, bad);
     }
-    for (i = 0; i < SL_NX; i++) set_lane(next[i], lane, 0.0);
+    for (i = 0; i < SL_NX; i++) set_lane(pack->next[i], lane, 0.0);
   }
 }
 
@@ -183,49 +187,33 @@ static void observe(sl_pack *pack, int64_t k, sl_time now) {
   if (job->output_every > 0 && (k % job->output_every == 0 || k == job->steps)) write_row(pack, k, now, 0, pack->lanes);
 }
 
-/* One classical Runge-Kutta step from x into next; e, sigma and u are those at the start of the step. */
-static void step_rk4(sl_pack *pack, int64_t k, const sl_time *times, sl_group *next) {
+/* A stage of a classical Runge-Kutta step, from x into next; e, sigma and u become those at the start of the step. */
+static void stage_rk4(sl_pack *pack, int64_t k, int stage) {
   static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   static const int when[4] = {0, 1, 1, 2};
   const double h = pack->job->step;
-  const sl_group *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
-  sl_group at[SL_NX], slope[SL_NX];
-  int stage, i, g;
+  const sl_v gain = slv_set(weight[stage] * h), advance = slv_set(stage < 3 ? node[stage + 1] * h : 0.0);
+  const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
+  const sl_group *at = stage == 0 ? x : (const sl_group *)pack->at;
+  const sl_group *sum = stage == 0 ? x : (const sl_group *)pack->next;
+  sl_group slope[SL_NX];
+  int i, g;
+#if SL_SAMPLED
+  (void)k;
+  kernel_plant(pack->times[when[stage]], at, (const sl_group *)pack->u, p, r, slope);
+#else
+  if (stage == 0) {
+    kernel_closed(pack->times[0], at, p, r, slope, pack->u, pack->e, pack->sigma);
+    observe(pack, k, pack->times[0]);
+  } else {
+    sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
+    kernel_closed(pack->times[when[stage]], at, p, r, slope, u, e, sigma);
+  }
+#endif
   for (i = 0; i < SL_NX; i++) {
     for (g = 0; g < SL_G; g++) {
-      at[i][g] = pack->x[i][g];
-      next[i][g] = pack->x[i][g];
-    }
-  }
-#pragma GCC unroll 1
-  for (stage = 0; stage < 4; stage++) {
-    const sl_v gain = slv_set(weight[stage] * h);
-#if SL_SAMPLED
-    kernel_plant(times[when[stage]], (const sl_group *)at, (const sl_group *)pack->u, p, r, slope);
-#else
-    sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
-    kernel_closed(times[when[stage]], (const sl_group *)at, p, r, slope, u, e, sigma);
-    if (stage == 0) {
-      for (i = 0; i < SL_NJ; i++) {
-        for (g = 0; g < SL_G; g++) {
-          pack->u[i][g] = u[i][g];
-          pack->e[i][g] = e[i][g];
-          pack->sigma[i][g] = sigma[i][g];
-        }
-      }
-      observe(pack, k, times[0]);
-    }
-#endif
-    for (i = 0; i < SL_NX; i++) {
-      for (g = 0; g < SL_G; g++) {
-        next[i][g] = next[i][g] + gain * slope[i][g];
-      }
-    }
-    if (stage < 3) {
-      const sl_v advance = slv_set(node[stage + 1] * h);
-      for (i = 0; i < SL_NX; i++) {
-        for (g = 0; g < SL_G; g++) at[i][g] = pack->x[i][g] + advance * slope[i][g];
-      }
+      pack->next[i][g] = sum[i][g] + gain * slope[i][g];
+      pack->at[i][g] = x[i][g] + advance * slope[i][g];
     }
   }
 }
@@ -254,11 +242,10 @@ static void control_at_end(sl_pack *pack, int64_t k, sl_time now) {
 #endif
 }
 
-static void load_pack(sl_pack *pack, const sl_job *job, int64_t first) {
+static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock *clock) {
   int lane, i;
   pack->job = job;
-  pack->clock.job = job;
-  pack->clock.block[0] = pack->clock.block[1] = -1;
+  pack->clock = clock;
   pack->lanes = (int)(job->last - first < SL_PACK ? job->last - first : SL_PACK);
   pack->live = pack->lanes;
   for (lane = 0; lane < SL_PACK; lane++) {
@@ -270,6 +257,8 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first) {
   }
   kernel_run((const sl_group *)pack->p, pack->r);
   kernel_start((const sl_group *)pack->p, (const sl_group *)pack->r, pack->x);
+  pack->times[0].varying = (const sl_group *)pack->varying[0];
+  pack->times[2] = time_at(pack, 0, pack->varying[2]);
 }
 
 static int within(const sl_group *x, double bound) {
@@ -282,53 +271,76 @@ static int within(const sl_group *x, double bound) {
   return slv_all(inside);
 }
 
-static void run_pack(sl_pack *pack, const sl_job *job, int64_t first) {
-  const double bound = sl_fmin(job->bound, DBL_MAX);
-  sl_group *before = pack->varying[0], *middle = pack->varying[1], *after = pack->varying[2];
-  sl_time times[3];
-  int64_t k, reported = 0;
-  int lane, i, g;
-  load_pack(pack, job, first);
-  times[0] = time_at(pack, 0, before);
-  for (k = 0; k < job->steps && pack->live > 0; k++) {
-    sl_group next[SL_NX], *swap;
-    times[1] = time_at(pack, 2 * k + 1, middle);
-    times[2] = time_at(pack, 2 * k + 2, after);
+/* What was the end of a step becomes the beginning of step k; its control and what is observed of it. */
+static void begin_step(sl_pack *pack, int64_t k) {
+  sl_group *free = (sl_group *)pack->times[0].varying;
+  pack->times[0] = pack->times[2];
+  pack->times[1] = time_at(pack, 2 * k + 1, pack->varying[1]);
+  pack->times[2] = time_at(pack, 2 * k + 2, free);
 #if SL_SAMPLED
-    sample_control(pack, k, times[0]);
-    observe(pack, k, times[0]);
+  sample_control(pack, k, pack->times[0]);
+  observe(pack, k, pack->times[0]);
 #endif
-    step_rk4(pack, k, times, next);
-    if (!within((const sl_group *)next, bound)) stop_runaways(pack, k, next, bound, times[0]);
-    for (i = 0; i < SL_NX; i++) {
-      for (g = 0; g < SL_G; g++) pack->x[i][g] = next[i][g];
+}
+
+static void end_step(sl_pack *pack, int64_t k, double bound) {
+  if (!within((const sl_group *)pack->next, bound)) stop_runaways(pack, k, bound);
+  memcpy(pack->x, pack->next, sizeof pack->x);
+}
+
+/* What is left after step k - 1, the last. */
+static void end_runs(sl_pack *pack, int64_t k) {
+  const enum sl_status status = k == pack->job->steps ? SL_OK : SL_STOPPED;
+  int lane;
+  control_at_end(pack, k, pack->times[2]);
+  observe(pack, k, pack->times[2]);
+  for (lane = 0; lane < pack->lanes; lane++) {
+    if (pack->alive[lane]) finish_lane(pack, lane, k, status, -1);
+  }
+}
+
+/* Packs side by side, stage by stage: none waits for its own last stage, for another's lies between. */
+static void run_packs(sl_pack *packs, int count, const sl_job *job) {
+  const double bound = sl_fmin(job->bound, DBL_MAX);
+  int64_t k, reported = 0, runs = 0;
+  int stage, i, live = 1;
+  for (i = 0; i < count; i++) runs += packs[i].lanes;
+  for (k = 0; k < job->steps && live > 0; k++) {
+    for (i = 0; i < count; i++) {
+      if (packs[i].live > 0) begin_step(&packs[i], k);
     }
-    times[0] = times[2];
-    swap = before;
-    before = after;
-    after = swap;
+#pragma GCC unroll 1
+    for (stage = 0; stage < 4; stage++) {
+      for (i = 0; i < count; i++) {
+        if (packs[i].live > 0) stage_rk4(&packs[i], k, stage);
+      }
+    }
+    for (i = live = 0; i < count; i++) {
+      if (packs[i].live > 0) end_step(&packs[i], k, bound);
+      live += packs[i].live;
+    }
     if ((k + 1) % 4096 == 0) {
       if (job->progress) {
-        __atomic_fetch_add(job->progress, (k + 1 - reported) * pack->lanes, __ATOMIC_RELAXED);
+        __atomic_fetch_add(job->progress, (k + 1 - reported) * runs, __ATOMIC_RELAXED);
         reported = k + 1;
       }
-      if (job->stop && *job->stop) break;
+      if (job->stop && *job->stop) {
+        k++;
+        break;
+      }
     }
   }
-  if (job->progress) __atomic_fetch_add(job->progress, (job->steps - reported) * pack->lanes, __ATOMIC_RELAXED);
-  if (pack->live == 0) return;
-  control_at_end(pack, k, times[0]);
-  observe(pack, k, times[0]);
-  for (lane = 0; lane < pack->lanes; lane++) {
-    if (pack->alive[lane]) finish_lane(pack, lane, k, k == job->steps ? SL_OK : SL_STOPPED, -1);
+  if (job->progress) __atomic_fetch_add(job->progress, (job->steps - reported) * runs, __ATOMIC_RELAXED);
+  for (i = 0; i < count; i++) {
+    if (packs[i].live > 0) end_runs(&packs[i], k);
   }
 }
 
 /* ---- entry points -------------------------------------------------------------------------------------- */
 
-/* Sizes a caller has to know: pack, parameters, states, metrics, columns, tables. */
+/* Sizes a caller has to know: runs side by side, parameters, states, metrics, columns, tables. */
 __attribute__((visibility("default"))) void springline_layout(int64_t *layout) {
-  layout[0] = SL_PACK;
+  layout[0] = SL_PACK * SL_PACKS;
   layout[1] = SL_NP;
   layout[2] = SL_NX;
   layout[3] = SL_NMETRICS;
@@ -337,7 +349,16 @@ __attribute__((visibility("default"))) void springline_layout(int64_t *layout) {
 }
 
 __attribute__((visibility("default"))) void springline_simulate(const sl_job *job) {
-  sl_pack pack;
-  int64_t first;
-  for (first = job->first; first < job->last; first += SL_PACK) run_pack(&pack, job, first);
+  sl_pack packs[SL_PACKS];
+  sl_clock clock;
+  int64_t first = job->first;
+  clock.job = job;
+  while (first < job->last) {
+    int count;
+    clock.block[0] = clock.block[1] = -1;
+    for (count = 0; count < SL_PACKS && first < job->last; count++, first += SL_PACK) {
+      load_pack(&packs[count], job, first, &clock);
+    }
+    run_packs(packs, count, job);
+  }
 }

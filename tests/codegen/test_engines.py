@@ -67,8 +67,8 @@ def reference(request: pytest.FixtureRequest, shaken: Program, table: NDArray[np
 LANES = [
     KernelOptions(width=1, groups=1, flags=("-O0",)),
     KernelOptions(width=1, groups=1, tunable=VARIED),
-    KernelOptions(width=2, groups=1, flags=("-O1",)),
-    KernelOptions(width=4, groups=2, flags=("-O2",), tunable=VARIED),
+    KernelOptions(width=2, groups=1, packs=3, flags=("-O1",)),
+    KernelOptions(width=4, groups=2, packs=2, flags=("-O2",), tunable=VARIED),
     KernelOptions(width=4, groups=1),
     KernelOptions(width=8, groups=2, flags=("-O2",)),
     KernelOptions(width=16, groups=1, flags=("-O1",), tunable=VARIED),
@@ -77,7 +77,9 @@ LANES = [
 
 
 @pytest.mark.parametrize(
-    "options", LANES, ids=lambda o: f"W{o.width}G{o.groups}{''.join(o.flags or ())}{'-baked' * bool(o.tunable)}"
+    "options",
+    LANES,
+    ids=lambda o: f"W{o.width}G{o.groups}P{o.packs}{''.join(o.flags or ())}{'-baked' * bool(o.tunable)}",
 )
 def test_lanes_equal_casadi(
     options: KernelOptions, reference: tuple[bool, Runs], shaken: Program, table: NDArray[np.float64]
@@ -125,9 +127,14 @@ def test_every_build(
             assert_same(run(shaken, table, options, sampled=sampled, settings=settings), expected)
 
 
-def test_neighbours_do_not_matter(shaken: Program, table: NDArray[np.float64]) -> None:
+@pytest.mark.parametrize(
+    "options",
+    [KernelOptions(width=4, groups=2), KernelOptions(width=2, groups=1, packs=3, flags=("-O1",))],
+    ids=["groups", "packs"],
+)
+def test_neighbours_do_not_matter(options: KernelOptions, shaken: Program, table: NDArray[np.float64]) -> None:
     """A run alone, first in a pack, last in a pack, beside runs that diverge: the same bits."""
-    kernel = compile_kernel(shaken, False, KernelOptions(width=4, groups=2))
+    kernel = compile_kernel(shaken, False, options)
     together = kernel.run(table, SHORT)
     keys = [slot.key for slot in shaken.system.slots]
     wild = table.copy()

@@ -234,16 +234,22 @@ def test_threads_share_nothing(shaken: Program, values_of: Values) -> None:
     assert len(results) == 4
 
 
-def test_a_run_can_be_watched_and_stopped(shaken: Program, values_of: Values) -> None:
-    kernel = compile_kernel(shaken, False, PLAIN)
+@pytest.mark.parametrize("packs", [1, 3])
+def test_runs_can_be_watched_and_stopped(packs: int, shaken: Program, values_of: Values) -> None:
+    kernel = compile_kernel(shaken, False, replace(PLAIN, packs=packs))
+    assert kernel.width == packs
+    runs = np.tile(values_of(shaken), (2 * packs, 1))
     control = Control()
     control.stop.value = 1
-    result = kernel.run(values_of(shaken)[None, :], LoopSettings(100_000, 1e-5), control=control)
-    assert result.status[0] == 3
-    assert result.end_time[0] < 0.1
+    result = kernel.run(runs, LoopSettings(100_000, 1e-5, output_every=1), control=control)
+    assert set(result.status) == {3}
+    assert result.trajectory is not None and result.rows is not None
+    for end, rows, trajectory in zip(result.end_time, result.rows, result.trajectory, strict=True):
+        assert 0.0 < end < 0.1
+        assert trajectory[rows - 1, 0] == end, "the last row is where the run was stopped"
     control = Control()
-    kernel.run(values_of(shaken)[None, :], LoopSettings(10_000, 1e-5), control=control)
-    assert control.progress.value == 10_000
+    kernel.run(runs, LoopSettings(10_000, 1e-5), control=control)
+    assert control.progress.value == 2 * packs * 10_000
 
 
 def test_wrong_shapes_are_refused(shaken: Program, values_of: Values) -> None:
