@@ -14,6 +14,7 @@ import argparse
 import json
 import tempfile
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -111,7 +112,7 @@ def measure(runs: int, duration: float, threads: int, repeats: int) -> dict[str,
     }
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table, or with --json one object."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.batch_throughput", description=__doc__)
     parser.add_argument("--runs", type=int, default=2048)
@@ -119,7 +120,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=processors())
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--json", action="store_true")
-    chosen = parser.parse_args()
+    chosen = parser.parse_args(arguments)
     found = measure(chosen.runs, chosen.duration, chosen.threads, chosen.repeats)
     if chosen.json:
         print(json.dumps(found, indent=2))

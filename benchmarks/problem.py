@@ -33,6 +33,9 @@ QUANTUM = 400
 PREFIX = 4_000
 """Steps after which results are compared: with a zero-order hold the loop magnifies rounding errors as it goes on."""
 
+# Linked the usual way, a library of -ffast-math makes the whole process flush denormal numbers to zero, springline too.
+FAST_MATH = ("-ffast-math", "-nostartfiles")
+
 # Arm (kg, kg, kg m^2, m, m/s^2), springs (N/m, N m/rad), motors (kg, kg m^2).
 M2, M3, J, L3, G = 10.0, 40.0, 40.0 * 0.74**2 / 3.0, 0.74, 9.8
 K_LIFT, K_ROTATION, MOTOR_LIFT, MOTOR_ROTATION = 2.0e6, 2.0e4, 2.0, 0.01

@@ -2,44 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from importlib import resources
 from importlib.metadata import version
-from typing import Any, Literal
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from springline.codegen.export import Export, Port, Real, bind, operations
+from springline.codegen.export import Export, Port, operations
 from springline.codegen.export_text import text_files
 from springline.codegen.model_c import model_files
 from springline.codegen.typed import TypedInterface
 from springline.codegen.vectors import test_vectors
-from springline.model.system import Structure
 
 
-def generate_files(
-    structure: Structure,
-    values: NDArray[np.float64],
-    *,
-    tunable: Sequence[str] | Literal["all", "none"] = "none",
-    prefix: str = "springline",
-    real: Real = "double",
-) -> tuple[dict[str, bytes], dict[str, Any]]:
+def generate_files(export: Export) -> tuple[dict[str, bytes], dict[str, Any]]:
     """The files of an export by relative path, and its manifest (to which codegen.manifest adds the list of files).
 
-    structure  what the system consists of
-    values     its numbers, one per System.slots entry, SI
-    tunable    parameters that stay variables of the C: slot keys, or what stands for several ("control", "control.mu")
-    prefix     of every public name
-    real       number type of the C
-    The same arguments give the same bytes in every process and folder.
-    Raises ValueError for a value out of its bounds, an unknown name or an unusable prefix; ToolchainError without a C
-    compiler, which the expected outputs of test_vectors.txt need.
+    The same export gives the same bytes in every process and folder.
+    Raises ToolchainError without a C compiler, which the expected outputs of test_vectors.txt need.
     """
-    export = bind(structure, values, tunable=tunable, prefix=prefix, real=real)
     runtime = resources.files("springline.codegen") / "runtime"
-    headers = ("sl_mathf.h",) if real == "float" else ("sl_math.h", "sl_casadi.h")
+    headers = ("sl_mathf.h",) if export.real == "float" else ("sl_math.h", "sl_casadi.h")
     model = {**model_files(export), **{f"src/{name}": (runtime / name).read_bytes() for name in headers}}
     interface = TypedInterface(export)
     files = {

@@ -174,8 +174,11 @@ def bind(
 ) -> Export:
     """The Export of a structure with these numbers.
 
-    values   one per System.slots entry, SI
-    tunable  slot keys, or tables or parameters that stand for all their slots ("control", "control.mu")
+    structure  what the system consists of
+    values     its numbers, one per System.slots entry, SI
+    tunable    parameters that stay arguments: slot keys, or what stands for several ("control", "control.mu")
+    prefix     of every public name
+    real       number type of the C
     Raises ValueError for a wrong number of values, a value out of its bounds, an unknown name or no C identifier.
     """
     system = System(structure)

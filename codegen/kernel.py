@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen import toolchain
-from springline.codegen.kernel_source import Engine, KernelOptions, KernelSource, print_kernel
+from springline.codegen.kernel_source import ONE_RUN, Engine, KernelOptions, KernelSource, print_kernel
 from springline.codegen.program import Program, program
 from springline.model.system import Structure, TableLayout
 
 __all__ = [
     "METRICS",
+    "ONE_RUN",
     "STATUS",
     "Control",
     "Engine",
@@ -27,6 +28,7 @@ __all__ = [
     "Runs",
     "Table",
     "compile_kernel",
+    "joined",
     "kernel",
 ]
 
@@ -97,6 +99,12 @@ class Runs:
     quantity: NDArray[np.int32]
     trajectory: Floats | None = None
     rows: NDArray[np.int64] | None = None
+
+
+def joined(parts: Sequence[Runs]) -> Runs:
+    """The Runs of several calls as those of one, without trajectories."""
+    names = ("metrics", "final_state", "end_time", "status", "quantity")
+    return Runs(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 @dataclass

@@ -41,6 +41,11 @@ class KernelOptions:
     compiler: toolchain.Compiler | None = None
 
 
+ONE_RUN = KernelOptions(width=2, groups=1, packs=1)
+"""For a run by itself: two lanes, the second repeats the first. The idle lane costs nothing, and in vector registers
+the bits of a double are at hand, without a detour through integer registers."""
+
+
 @dataclass(frozen=True, slots=True)
 class KernelSource:
     """All that a compiler has to be given: it may travel to another machine.

@@ -1,7 +1,8 @@
 """Folders of generated files: what springline wrote there, whether it is stale, and what may be replaced.
 
 ``manifest.json`` lists every file of the folder with its SHA-256. A file may be replaced or removed only if
-it is still as the manifest says, so nobody's work is ever overwritten unasked.
+it is still as the manifest says, so nobody's work is ever overwritten unasked. Its ``kind`` says which command the
+folder belongs to (that of generated C has none), and no other command touches what it lists.
 """
 
 import contextlib
@@ -63,7 +64,8 @@ def write_tree(
     """Make `folder` hold exactly `files` of those that springline writes, and a manifest that lists them.
 
     files     path inside the folder (``/`` between parts) -> content
-    manifest  what the manifest says beside the list of files, which is added under ``files``
+    manifest  what the manifest says beside the list of files, which is added under ``files``; its ``kind``, if any,
+              is that of the folder
     force     replace and remove edited and foreign files that are in the way too
 
     All or nothing: conflicts are looked for before anything is written, everything is prepared in a temporary
@@ -73,7 +75,7 @@ def write_tree(
     Raises FolderConflict, ValueError for an impossible path, OSError if the disk refuses.
     """
     new = _with_manifest(files, manifest)
-    listed = _listed(folder)
+    listed = _listed(folder, manifest.get("kind"))
     removals = sorted(path for path in listed or {} if path not in new and _content(folder, path) is not None)
     _refuse_conflicts(folder, new, removals, listed, force=force)
     writes = [path for path, content in new.items() if _content(folder, path) != content]
@@ -85,10 +87,10 @@ def write_tree(
 def check_tree(folder: Path, files: Mapping[str, bytes], manifest: Mapping[str, object]) -> list[Stale]:
     """What ``write_tree`` with these arguments would find to change; empty if the folder is up to date.
 
-    Writes nothing. Raises ValueError for an impossible path.
+    Writes nothing. Raises FolderConflict if the folder is of another kind, ValueError for an impossible path.
     """
     new = _with_manifest(files, manifest)
-    listed = _listed(folder) or {}
+    listed = _listed(folder, manifest.get("kind")) or {}
     stale = []
     for path, content in new.items():
         old = _content(folder, path)
@@ -119,6 +121,27 @@ def summary(folder: Path, stale: Sequence[Stale]) -> str:
 # --- what is there, and what may go ----------------------------------------------------------------------
 
 
+def read_manifest(folder: Path, kind: object) -> dict[str, Any] | None:
+    """The manifest of a folder of this kind; None if it has none, or one that springline did not write.
+
+    Raises FolderConflict if the folder is of another kind: what its manifest lists would be taken for ours and removed.
+    """
+    content = _content(folder, MANIFEST)
+    if content is None:
+        return None
+    try:
+        manifest: dict[str, Any] = json.loads(content)
+        listed = {entry["path"]: entry["sha256"] for entry in manifest["files"]}
+    except (ValueError, KeyError, TypeError):
+        return None
+    # A manifest may come from elsewhere, and what it lists may be removed: no path of it leads outside.
+    if not all(isinstance(path, str) and _stays_inside(path) for path in listed):
+        return None
+    if manifest.get("kind") != kind:
+        raise FolderConflict(folder, {MANIFEST: "lists what another command wrote here"}, force_helps=False)
+    return manifest
+
+
 def _with_manifest(files: Mapping[str, bytes], manifest: Mapping[str, object]) -> dict[str, bytes]:
     """All files to write, sorted by path, the manifest last."""
     for path in files:
@@ -132,17 +155,10 @@ def _with_manifest(files: Mapping[str, bytes], manifest: Mapping[str, object]) -
     return ordered | {MANIFEST: canonical_json({**manifest, "files": entries})}
 
 
-def _listed(folder: Path) -> dict[str, str] | None:
-    """Path -> SHA-256 as the folder's manifest lists them; None if it has none, or one that is not ours."""
-    content = _content(folder, MANIFEST)
-    if content is None:
-        return None
-    try:
-        listed = {entry["path"]: entry["sha256"] for entry in json.loads(content)["files"]}
-    except (ValueError, KeyError, TypeError):
-        return None
-    # A manifest may come from elsewhere, and what it lists may be removed: no path of it leads outside.
-    return listed if all(isinstance(path, str) and _stays_inside(path) for path in listed) else None
+def _listed(folder: Path, kind: object) -> dict[str, str] | None:
+    """Path -> SHA-256 as the folder's manifest lists them; None if it has none of ours."""
+    manifest = read_manifest(folder, kind)
+    return None if manifest is None else {entry["path"]: entry["sha256"] for entry in manifest["files"]}
 
 
 def _refuse_conflicts(

@@ -1,4 +1,8 @@
-"""Scenarios in, tables and figures out: `load_scenario`, `simulate`, `batch`."""
+"""Scenarios in, tables and figures out: `load_scenario`, `simulate`, `batch`.
+
+What is wrong with a scenario or its numbers is an InputError (a ValueError), which names file, key and what was
+expected; an argument of another kind, such as a scenario's name where a Scenario belongs, is a TypeError.
+"""
 
 from __future__ import annotations
 

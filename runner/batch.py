@@ -24,12 +24,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
-from springline.codegen.kernel import Control, Runs
+from springline.codegen.kernel import Control, Runs, joined
 from springline.codegen.toolchain import ToolchainError
 from springline.runner.dataset import Dataset
+from springline.runner.dotted import expect_keys
 from springline.runner.errors import InputError, Problem
 from springline.runner.plan import Chunk, Columns, Group, Plan
-from springline.runner.scenario import Scenario
+from springline.runner.scenario import Scenario, expect_scenario
 from springline.runner.simulate import field as unit_field
 from springline.runner.simulate import metrics_table, trajectory_schema
 from springline.runner.terminal import version
@@ -363,21 +364,35 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
              the kernel (compiled on first use, then cached)
     jobs     threads, None for one per processor
     Returns a table with one row a run: run, the varied keys, every metric, status, t_end. It does not depend on `jobs`.
-    Raises InputError for an unknown key or a value out of bounds, ValueError for unequal lengths or jobs < 1.
+    Raises TypeError for arguments of another kind, InputError (a ValueError) for an unknown key, a value out of bounds
+    and unequal lengths, ValueError for jobs < 1, ToolchainError if there is no C compiler.
     """
+    expect_scenario(scenario)
+    expect_keys(columns, "columns such as {'control.delta': array}")
+    if jobs is not None and not isinstance(jobs, int | np.integer):
+        raise TypeError(f"jobs is {jobs!r}, expected a whole number or None")
     if jobs is not None and jobs < 1:
         raise ValueError(f"jobs is {jobs}, expected at least 1")
-    arrays = {key: np.atleast_1d(np.asarray(values, dtype=np.float64)) for key, values in columns.items()}
+    arrays = {key: _array(values) for key, values in columns.items()}
     lengths = {key: len(values) for key, values in arrays.items()}
     if len(set(lengths.values())) != 1 or 0 in lengths.values():
-        raise ValueError(f"the columns of a batch must be non-empty arrays of one length, got {lengths}")
+        text = "the columns of a batch must be non-empty arrays of one length"
+        raise InputError(Problem(scenario.source, "", text, str(lengths)))
     slots, runs = scenario.slots_for(arrays), max(lengths.values())
     work = work_for(scenario, slots)
     result = metrics_table(work.system.joints, _over_threads(work, work.chosen(slots, runs), jobs))
     keys = scenario.numeric_keys()
     for position, (key, array) in enumerate(arrays.items()):
-        result = result.add_column(position, unit_field(key, keys[key].unit), pa.array(array))
+        result = result.add_column(position, unit_field(key, keys[key].unit), pa.array(array, pa.float64()))
     return result.add_column(0, unit_field("run", "", pa.int64()), pa.array(np.arange(runs)))
+
+
+def _array(values: ArrayLike) -> NDArray[Any]:
+    """A column as an array of what it holds; whether these are numbers is checked with their bounds."""
+    try:
+        return np.atleast_1d(np.asarray(values))
+    except ValueError:  # lists of different lengths
+        return np.asarray(values, dtype=object)
 
 
 def _over_threads(work: Work, parameters: Floats, jobs: int | None) -> Runs:
@@ -387,6 +402,4 @@ def _over_threads(work: Work, parameters: Floats, jobs: int | None) -> Runs:
         packs = -(-len(parameters) // width)
         size = width * max(1, packs // (_CHUNKS_PER_THREAD * pool.threads))
         futures = [pool.submit(work, parameters[i : i + size], ()) for i in range(0, len(parameters), size)]
-        parts = [future.result().runs for future in futures]
-    names = ("metrics", "final_state", "end_time", "status", "quantity")
-    return Runs(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        return joined([future.result().runs for future in futures])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -17,41 +17,32 @@ from springline.runner.locate import canonical_path, read_signal_file
 from springline.runner.tables import UNITS, Column, Ends, Table, read_table
 
 Document = dict[str, dict[str, Any]]
-Where = Callable[[str], str]
 
 # A time is a whole multiple of the step if it is off by no more than this of itself.
 _WHOLE = 1e-9
 
 
-def resolve(
-    raw: Mapping[str, object], source: str, folder: Path, overridden: Sequence[str] = ()
-) -> tuple[Document, tuple[Table, ...]]:
+def resolve(raw: Mapping[str, object], where: str, folder: Path) -> tuple[Document, tuple[Table, ...]]:
     """A document with every default filled in, and its signal tables.
 
-    source      name of the file, for messages
-    folder      what relative paths refer to
-    overridden  keys whose values are not the file's
+    where   what the document came from, for messages
+    folder  what relative paths refer to
     Raises InputError with all problems.
     """
-
-    def where(key: str) -> str:
-        ours = any(key == item or key.startswith(f"{item}.") or item.startswith(f"{key}.") for item in overridden)
-        return f"override of {source}" if ours else source
-
-    problems = [unknown(where(key), key, "table", key, schema.TABLES) for key in raw if key not in schema.TABLES]
+    problems = [unknown(where, key, "table", key, schema.TABLES) for key in raw if key not in schema.TABLES]
     given: dict[str, dict[str, Any]] = {}
     for name in schema.TABLES:
         table = raw.get(name, {})
         if isinstance(table, dict):
             given[name] = table
         else:
-            problems.append(Problem(where(name), name, "expected a table", schema.given_text(table)))
+            problems.append(Problem(where, name, "expected a table", schema.given_text(table)))
             given[name] = {}
     mechanism = given["mechanism"].get("name", Structure().mechanism)
     if not isinstance(mechanism, str) or mechanism not in MECHANISMS:
         key, name = "mechanism.name", mechanism if isinstance(mechanism, str) else ""
         given_name = schema.given_text(mechanism)
-        problems.append(Problem(where(key), key, "unknown mechanism", given_name, name, tuple(MECHANISMS)))
+        problems.append(Problem(where, key, "unknown mechanism", given_name, name, tuple(MECHANISMS)))
         raise InputError(*problems)  # which keys are valid depends on it
     shape = schema.schema(mechanism)
 
@@ -93,14 +84,14 @@ def resolve(
 
 
 def _section_of_kind(
-    kinds: Mapping[str, type[schema.Section]], default: str, table: dict[str, Any], name: str, where: Where
+    kinds: Mapping[str, type[schema.Section]], default: str, table: dict[str, Any], name: str, where: str
 ) -> tuple[type[schema.Section], dict[str, Any]] | list[Problem]:
     """The section for the table's kind, and the table with its kind."""
     key = f"{name}.kind"
     kind = table.get("kind", default)
     if not isinstance(kind, str) or kind not in kinds:
         text = kind if isinstance(kind, str) else ""
-        return [Problem(where(key), key, "unknown kind", schema.given_text(kind), text, tuple(kinds))]
+        return [Problem(where, key, "unknown kind", schema.given_text(kind), text, tuple(kinds))]
     foreign = {
         item: [other for other, section in kinds.items() if item in section.model_fields]
         for item in table
@@ -108,7 +99,7 @@ def _section_of_kind(
     }
     misplaced = [
         Problem(
-            where(f"{name}.{item}"),
+            where,
             f"{name}.{item}",
             f"only goes with kind = {' or '.join(map(repr, of))}",
             f"kind = {kind!r}" + ("" if "kind" in table else " (the default)"),
@@ -119,11 +110,11 @@ def _section_of_kind(
     return misplaced or (kinds[kind], table | {"kind": kind})
 
 
-def _exponent_problems(control: Mapping[str, Any], where: Where) -> list[Problem]:
+def _exponent_problems(control: Mapping[str, Any], where: str) -> list[Problem]:
     """l > m and r > p (docs/paper.md section 4)."""
     return [
         Problem(
-            where(f"control.{high}"),
+            where,
             f"control.{high}",
             f"expected {high} > {low}",
             f"{high} = {control[high]}, {low} = {control[low]}",
@@ -133,20 +124,20 @@ def _exponent_problems(control: Mapping[str, Any], where: Where) -> list[Problem
     ]
 
 
-def _sampling_problems(document: Document, given: Mapping[str, object], where: Where) -> list[Problem]:
+def _sampling_problems(document: Document, given: Mapping[str, object], where: str) -> list[Problem]:
     """A sampled control has a period, a whole multiple of the step."""
     control, key = document["control"], "control.period"
     if "period" not in given:
         if control.get("mode") != "sampled":
             return []
         text = f"is missing: expected {schema.number_text(POSITIVE, 's')}, for the control is sampled"
-        return [Problem(where(key), key, text)]
+        return [Problem(where, key, text)]
     if control.get("mode") != "sampled":  # else a forgotten mode would go unnoticed
-        return [Problem(where(key), key, 'only goes with control.mode = "sampled"', 'mode = "continuous"')]
+        return [Problem(where, key, 'only goes with control.mode = "sampled"', 'mode = "continuous"')]
     return _whole_problems(document, key, where)
 
 
-def _whole_problems(document: Document, key: str, where: Where) -> list[Problem]:
+def _whole_problems(document: Document, key: str, where: str) -> list[Problem]:
     """The time at `key` must be a whole multiple of the step."""
     table, _, name = key.partition(".")
     if name not in document[table] or "step" not in document["simulation"]:
@@ -158,23 +149,23 @@ def _whole_problems(document: Document, key: str, where: Where) -> list[Problem]
     text = f"expected a whole multiple of simulation.step = {step!r} s"
     if math.isfinite(ratio):
         text += f" (the nearest is {max(round(ratio), 1) * step:.12g} s)"
-    return [Problem(where(key), key, text, f"{time!r} s")]
+    return [Problem(where, key, text, f"{time!r} s")]
 
 
 def _load_table(
-    table: dict[str, Any], name: str, units: Mapping[str, str], duration: float, folder: Path, where: Where
+    table: dict[str, Any], name: str, units: Mapping[str, str], duration: float, folder: Path, where: str
 ) -> Table:
     """The signal table that [reference] or [base_motion] asks for; makes path and units in `table` explicit."""
     columns, chosen = table["columns"], table["units"]
     si = {"t": "s", **units}
     problems = [
-        Problem(where(f"{name}.units.{key}"), f"{name}.units.{key}", f"there is no columns.{key} that has this unit")
+        Problem(where, f"{name}.units.{key}", f"there is no columns.{key} that has this unit")
         for key in chosen
         if key not in columns
     ]
     if len(columns) == 1:
         key = f"{name}.columns"
-        problems.append(Problem(where(key), key, f"expected a column for at least one of {', '.join(units)}"))
+        problems.append(Problem(where, key, f"expected a column for at least one of {', '.join(units)}"))
     if problems:
         raise InputError(*problems)
     table["units"] = chosen = {key: chosen.get(key, si[key]) for key in si if key in columns}
@@ -184,11 +175,11 @@ def _load_table(
         for key, unit in chosen.items()
     ]
     key = f"{name}.path"
-    data = read_signal_file(path, where(key), key)
-    read = read_table(data, path, wanted[0], wanted[1:], cast(Ends, table["ends"]), where=where(key), key=key)
+    data = read_signal_file(path, where, key)
+    read = read_table(data, path, wanted[0], wanted[1:], cast(Ends, table["ends"]), where=where, key=key)
     if not read.covers(duration):
         text = (
             f'{path} lasts from {read.t0:g} to {read.end:g} s: expected all of 0 to {duration:g} s with ends = "error"'
         )
-        raise InputError(Problem(where(f"{name}.ends"), f"{name}.ends", text))
+        raise InputError(Problem(where, f"{name}.ends", text))
     return read

@@ -8,6 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from springline.runner.errors import shortened
+
+
+def expect_keys(given: object, example: str) -> None:
+    """Raise TypeError for what is no mapping of dotted keys to something, as `example` is one."""
+    if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
+        raise TypeError(f"expected {example}, got {shortened(repr(given))}")
+
 
 def scale_key(key: str) -> str:
     """The key of the factor that stands for a value of the plant: "plant.m3" -> "plant.m3.scale"."""

@@ -49,7 +49,7 @@ class Problem:
         return text
 
 
-class InputError(Exception):
+class InputError(ValueError):
     """The user's input is wrong. `problems` holds every mistake that was found, one line each in the text."""
 
     exit_code = 2

@@ -41,21 +41,22 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
 
     Raises InputError if there is none.
     """
-    name = str(source)
+    name = str(source) or "."
     if not isinstance(source, Path) and name in packaged_scenarios():
         file = _packaged_file(f"{name}.toml")
         return file.read_text("utf-8"), Path(str(file)).parent
     path = Path(source)
-    if not path.exists():
-        if path.suffix == ".toml" and path.parent.is_dir():
-            there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
-            raise InputError(Problem(name, "", "there is no such file", "", path.name, there))
-        raise InputError(unknown(name, "", "file or packaged scenario", name, packaged_scenarios()))
-    if path.is_dir():
-        raise InputError(Problem(name, "", "is a folder: expected a TOML file or the name of a packaged scenario"))
     try:
         return path.read_text("utf-8-sig"), path.resolve().parent
-    except (OSError, UnicodeDecodeError) as error:
+    except (FileNotFoundError, NotADirectoryError) as error:
+        if path.suffix == ".toml" and path.parent.is_dir():
+            there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
+            raise InputError(Problem(name, "", "there is no such file", "", path.name, there)) from error
+        raise InputError(unknown(name, "", "file or packaged scenario", name, packaged_scenarios())) from error
+    except IsADirectoryError as error:
+        text = "is a folder: expected a TOML file or the name of a packaged scenario"
+        raise InputError(Problem(name, "", text)) from error
+    except (OSError, ValueError) as error:  # no UTF-8, and names that no file can have
         raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({error})")) from error
 
 

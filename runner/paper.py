@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from springline.codegen.manifest import MANIFEST, Changes, FolderConflict, canonical_json, write_tree
+from springline.codegen.manifest import MANIFEST, Changes, FolderConflict, canonical_json, read_manifest, write_tree
 from springline.runner.claims import Finding, judge
 from springline.runner.paper_cases import GROUPS
 from springline.runner.paper_claims import CLAIMS
@@ -57,7 +56,8 @@ def reproduce(folder: Path, groups: Sequence[int] | None = None, *, progress: Pr
     Raises FolderConflict if something else is in the way (nothing is written then), ValueError for a group that
     the paper does not have, ToolchainError if there is no C compiler.
     """
-    _refuse_other_folders(folder)
+    if read_manifest(folder, _KIND) is None and (folder / MANIFEST).exists():  # seen now, not when all is computed
+        raise FolderConflict(folder, {MANIFEST: "not written by springline"}, force_helps=False)
     whole = groups is None
     report = progress or (lambda share: None)
     done = study(GROUPS if groups is None else groups, whole=whole, progress=lambda share: report(_SIMULATED * share))
@@ -77,19 +77,6 @@ def reproduce(folder: Path, groups: Sequence[int] | None = None, *, progress: Pr
     files["numbers.json"] = canonical_json({"table_4": table, "claims": [_plain_finding(f) for f in findings]})
     changes = write_tree(folder, files, {"kind": _KIND, "groups": list(done.groups), "whole": whole})
     return Reproduction(folder, tuple(findings), tuple(table), changes)
-
-
-def _refuse_other_folders(folder: Path) -> None:
-    """A manifest of another command lists files that would be taken for ours, and removed."""
-    manifest = folder / MANIFEST
-    if not manifest.is_file():
-        return
-    try:
-        kind = json.loads(manifest.read_bytes())["kind"]
-    except (ValueError, KeyError, TypeError):
-        kind = None
-    if kind != _KIND:
-        raise FolderConflict(folder, {MANIFEST: "lists what another command wrote here"}, force_helps=False)
 
 
 def _plain_finding(finding: Finding) -> dict[str, Any]:

@@ -38,6 +38,8 @@ def stored_plan(dataset: Dataset) -> Plan:
                 tuple(axis_from_json(entry) for entry in sweep["vary"]),
             )
         )
+    except InputError:  # a ValueError too, but one that says already what is wrong
+        raise
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise InputError(Problem(f"{name}/sweep.json", "", f"is damaged ({error!r})")) from error
     if tables_hash(scenario) != stored.get("tables"):

@@ -7,6 +7,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from os import PathLike
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,13 +21,13 @@ from springline.model.sliding import LogForm, SurfaceExponents
 from springline.model.system import MotorStart, SignalKind, SignalShape, Structure, System
 from springline.runner import schema
 from springline.runner.checking import Document, resolve
-from springline.runner.dotted import flat, plain, replaced, scale_key
-from springline.runner.errors import InputError, Problem, unknown
+from springline.runner.dotted import expect_keys, flat, plain, replaced, scale_key
+from springline.runner.errors import InputError, Problem, shortened, unknown
 from springline.runner.locate import packaged_scenarios, read_scenario
 from springline.runner.tables import Table
 from springline.runner.toml_text import document_text
 
-__all__ = ["NumericKey", "Scenario", "load_scenario", "packaged_scenarios", "parse_set"]
+__all__ = ["NumericKey", "Scenario", "expect_scenario", "load_scenario", "packaged_scenarios", "parse_set"]
 
 Floats = NDArray[np.float64]
 Slots = dict[str, float | Floats]
@@ -220,8 +221,11 @@ class Scenario:
         """This scenario with other values at some dotted keys ("control.mu.0", "plant.m3.scale", …).
 
         A new kind of reference or base motion, another control mode or mechanism drops what belonged to the old one.
-        Raises InputError for whatever a file may not hold either.
+        Raises TypeError for what is no mapping of texts, InputError for whatever a file may not hold either.
         """
+        expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
+        if not overrides:
+            return self
         document = copy.deepcopy(self.document)
         for table in ("reference", "base_motion"):
             kind = overrides.get(f"{table}.kind", document[table]["kind"])
@@ -234,7 +238,7 @@ class Scenario:
             document = {name: document[name] for name in ("base_motion", "simulation")} | {"control": control}
         problems = []
         joints = len(MECHANISMS[self.document["mechanism"]["name"]].joints)
-        where = f"override of {self.source}"
+        where = _overridden(self.source)
         for key, value in overrides.items():
             try:
                 document = replaced(document, key.split("."), plain(value), joints)
@@ -242,7 +246,7 @@ class Scenario:
                 problems.append(Problem(where, key, f"there is no such entry: {error.args[0]}"))
         if problems:
             raise InputError(*problems)
-        return Scenario(self.source, self.folder, *resolve(document, self.source, self.folder, tuple(overrides)))
+        return Scenario(self.source, self.folder, *resolve(document, where, self.folder))
 
     def to_toml(self) -> str:
         """The complete scenario as TOML; loading it gives an equal one."""
@@ -253,8 +257,10 @@ def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = N
     """Load a scenario: a TOML file, or a packaged one by name ("paper/group1_shake").
 
     overrides  values by dotted key that take the place of the file's
-    Raises InputError that names all mistakes at once: file, key, what was expected, the nearest valid name.
+    Raises InputError that names all mistakes at once: file, key, what was expected, the nearest valid name. Raises
+    TypeError for a source that is no path or name, and overrides that are no mapping of texts.
     """
+    _expect_name(source)
     name = str(source)
     text, folder = read_scenario(source)
     try:
@@ -262,26 +268,46 @@ def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = N
     except (ValueError, RecursionError) as error:
         raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
     scenario = Scenario(name, folder, *resolve(document, name, folder))
-    return scenario.with_overrides(overrides) if overrides else scenario
+    return scenario if overrides is None else scenario.with_overrides(overrides)
 
 
-def parse_set(text: str) -> tuple[str, object]:
+def _expect_name(given: object) -> None:
+    if not isinstance(given, str | PathLike):
+        remedy = ": scenario.with_overrides(...) changes one" if isinstance(given, Scenario) else ""
+        raise TypeError(f"expected the path or name of a scenario, got {shortened(repr(given))}{remedy}")
+
+
+def expect_scenario(given: object) -> None:
+    """Raise TypeError, with the remedy, for what is no Scenario (its name, most likely)."""
+    if not isinstance(given, Scenario):
+        remedy = f": load_scenario({str(given)!r}) gives one" if isinstance(given, str | PathLike) else ""
+        raise TypeError(f"expected a Scenario, got {shortened(repr(given))}{remedy}")
+
+
+def parse_set(text: str, source: str) -> tuple[str, object]:
     """KEY=TOMLVALUE as a key and a value: "control.delta=0.02", 'control.law="power"', "plant.m3={ scale = 1.2 }".
 
+    source  the scenario that it is to override, for messages
     Raises InputError if it is not of that form.
     """
+    where = _overridden(source)
     key, equals, value = text.partition("=")
     key = key.strip()
     if not equals or not key:
-        raise InputError(Problem("--set", "", "expected KEY=VALUE", schema.given_text(text)))
+        raise InputError(Problem(where, "", "expected --set KEY=VALUE", schema.given_text(text)))
     try:
         parsed = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError) as error:
         hint = f"expected a TOML value ({error}); a text needs quotes: --set '{key}=\"…\"'"
-        raise InputError(Problem("--set", key, hint, value.strip())) from error
+        raise InputError(Problem(where, key, hint, value.strip())) from error
     if set(parsed) != {"value"}:
-        raise InputError(Problem("--set", key, "expected one TOML value", schema.given_text(value)))
+        raise InputError(Problem(where, key, "expected one TOML value", schema.given_text(value)))
     return key, parsed["value"]
+
+
+def _overridden(source: str) -> str:
+    """The place that every mistake in an override is named with: the scenario itself is known to be sound."""
+    return f"override of {source}"
 
 
 @lru_cache(maxsize=64)

@@ -337,12 +337,12 @@ def _table_section(units: Mapping[str, str]) -> type[Section]:
 
 
 def check(
-    section: type[Section], value: Mapping[str, Any], key: str, where: Callable[[str], str]
+    section: type[Section], value: Mapping[str, Any], key: str, where: str
 ) -> tuple[dict[str, Any], list[Problem]]:
     """A table in its final form, every default filled in, without the keys that are wrong; and what is wrong with them.
 
     key    the table's name
-    where  tells the file (or the override) that a dotted key comes from
+    where  what it came from, for messages
     """
     try:
         return section.model_validate(value).model_dump(exclude_none=True), []
@@ -357,25 +357,25 @@ def check(
     return {name: item for name, item in kept.items() if name not in wrong}, problems
 
 
-def _problem(section: type[Section], table: str, where: Callable[[str], str], error: ErrorDetails) -> Problem:
+def _problem(section: type[Section], table: str, where: str, error: ErrorDetails) -> Problem:
     context = error.get("ctx", {})
     loc = (*error["loc"], *context.get("at", ()))
     key = ".".join([table, *map(str, loc)])
     given = given_text(context.get("given", error["input"]))
     if error["type"] == "expected":
         valid, name = context.get("valid", ()), context.get("name", "")
-        return Problem(where(key), key, context["expected"], given, name, valid)
+        return Problem(where, key, context["expected"], given, name, valid)
     owner = _owner(section, loc)
     name = str(loc[-1]) if loc else table
     if error["type"] == "extra_forbidden":
-        return unknown(where(key), key, "key", name, owner.model_fields)
+        return unknown(where, key, "key", name, owner.model_fields)
     if error["type"] == "missing":
         leaf = next((item for item in owner.model_fields[name].metadata if isinstance(item, Leaf)), None)
         what = leaf.expected if leaf else f"a table with {_keys(_owner(section, (*loc, '')))}"
-        return Problem(where(key), key, f"is missing: expected {what}")
+        return Problem(where, key, f"is missing: expected {what}")
     inner = _owner(section, (*loc, ""))
     what = "a list of tables with" if error["type"] == "list_type" else "a table with"
-    return Problem(where(key), key, f"expected {what} {_keys(inner)}", given)
+    return Problem(where, key, f"expected {what} {_keys(inner)}", given)
 
 
 def _owner(section: type[Section], loc: Sequence[str | int]) -> type[Section]:

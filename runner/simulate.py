@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Thread
 from typing import get_args
 
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from springline.codegen.kernel import (
     METRICS,
+    ONE_RUN,
     STATUS,
     Control,
     Engine,
     Kernel,
-    KernelOptions,
     LoopSettings,
     Runs,
     Table,
@@ -27,7 +27,7 @@ from springline.model.base import COORDINATES
 from springline.model.parameters import Joint
 from springline.model.system import System
 from springline.runner.errors import InputError, Problem
-from springline.runner.scenario import Scenario
+from springline.runner.scenario import Scenario, expect_scenario
 from springline.runner.tables import Table as SignalTable
 
 Floats = NDArray[np.float64]
@@ -162,13 +162,14 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
 
     engine    "lanes", or "casadi" for the C that CasADi prints; the results are the same to the last bit
     progress  called now and then with the share that is done (0 .. 1)
-    Raises InputError if the trajectory would have more than 10 million rows, ValueError for an unknown engine,
-    ToolchainError if there is no C compiler.
+    Raises TypeError for what is no Scenario, InputError (a ValueError) if the trajectory would have more than 10
+    million rows, ValueError for an unknown engine, ToolchainError if there is no C compiler.
     """
+    expect_scenario(scenario)
     if engine not in get_args(Engine):
         raise ValueError(f"engine is {engine!r}, expected one of {', '.join(get_args(Engine))}")
     _refuse_endless(scenario)
-    loop = kernel(scenario.structure(), scenario.control_every > 0, KernelOptions(engine=engine, width=1, groups=1))
+    loop = kernel(scenario.structure(), scenario.control_every > 0, replace(ONE_RUN, engine=engine))
     settings = loop_settings(scenario, trajectory=True)
     tables = kernel_tables(scenario.tables())
     runs = _watched(loop, scenario.values()[None, :], settings, tables, progress)

@@ -221,11 +221,13 @@ class _Reader:
         if not isinstance(overrides, dict):
             self._wrong("set", "expected a table of dotted keys", overrides)
             return None
-        path = self._folder / source
+        path, key = self._folder / source, "scenario"
         try:
-            return load_scenario(path if path.is_file() else source, dict(_flattened(overrides)))
+            scenario = load_scenario(path if path.is_file() else source)
+            key = "set"
+            return scenario.with_overrides(dict(_flattened(overrides)))
         except InputError as error:
-            there = f"{self._name}: scenario"
+            there = f"{self._name}: {key}"
             self._problems += [replace(problem, where=f"{there}: {problem.where}") for problem in error.problems]
             return None
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen import lanes
+from springline.codegen.c_tokens import tokens
 from springline.codegen.kernel import (
     Control,
     Kernel,
@@ -57,7 +58,10 @@ class Work:
 
     @property
     def identity(self) -> str:
-        """Hash of all that decides the bits of the results, the same on every machine (whatever its vector width)."""
+        """Hash of all that decides the bits of the results, the same on every machine (whatever its vector width).
+
+        Of the C it takes the tokens: who resumes a dataset after a comment was edited gets the same bits.
+        """
         return self._emission[0]
 
     @cached_property
@@ -93,8 +97,13 @@ def _emitted(
     slots = program(structure).system.slots
     constants = {slot.key: value for slot, value in zip(slots, baked, strict=True) if slot.key not in tunable}
     emission = lanes.emit(program(structure), constants, 1)
-    text = canonical_json({**runtime_sources(), "kernel.h": emission.text, "sampled": sampled})
+    text = canonical_json({**_runtime_tokens(), "kernel.h": tokens(emission.text), "sampled": sampled})
     return sha256(text).hexdigest(), emission.tunable
+
+
+@lru_cache(maxsize=1)
+def _runtime_tokens() -> dict[str, list[str]]:
+    return {name: tokens(text) for name, text in runtime_sources().items()}
 
 
 def work_for(scenario: Scenario, slots: Slots) -> Work:

@@ -3,6 +3,7 @@
 import json
 import math
 import platform
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springline.benchmarks import harness, problem, roofline
+from springline.benchmarks import harness, math_speed, problem, roofline
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, handwritten_c, ours
 from springline.runner import bench
@@ -43,6 +44,7 @@ def test_a_contender_does_the_same_work(contender: problem.Contender) -> None:
     assert np.all(np.abs(final - expected) <= contender.tolerance * np.maximum(1.0, np.abs(expected)))
     # The three runs differ by far more than the tolerance, so one that ignored delta would be noticed.
     assert np.max(np.abs(expected[0] - expected[2])) > 2e-2
+    assert np.all(np.array([sys.float_info.min]) * 0.5 > 0.0), "it makes the process flush denormal numbers to zero"
 
 
 def test_contenders_are_told_apart() -> None:
@@ -115,6 +117,14 @@ def test_operations_are_counted_in_the_machine_code(require_tool: Callable[..., 
     # however many are in a vector.
     assert all(300 < count < 1000 for count in counts)
     assert counts[0] == pytest.approx(counts[1], rel=0.1)
+
+
+def test_elementary_functions_are_timed_each_by_itself() -> None:
+    times = math_speed.measure(samples=2)
+    assert {"exp", "sincos", "pow"} <= times.keys()
+    assert all(0.0 < ns < 1000.0 for row in times.values() for ns in row.values())
+    # The law, its surface and the arm, for two joints; nothing else of them needs a fast path.
+    assert math_speed.calls() == {"exp": 2, "log": 2, "log1p": 2, "pow_m1_3": 2, "pow_p1_2": 2, "sincos": 1}
 
 
 def test_the_command_writes_rows_a_chart_and_json(

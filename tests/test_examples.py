@@ -12,6 +12,7 @@ from types import MappingProxyType
 import pytest
 
 from springline.codegen.api import generate_files
+from springline.codegen.export import bind
 from springline.codegen.manifest import write_tree
 from springline.runner import load_scenario
 
@@ -111,7 +112,7 @@ def test_firmware(tmp_path: Path, require_tool: Callable[..., str]) -> None:
     require_tool("qemu-system-arm", hint)
     scenario = load_scenario("paper/nominal")
     single = tmp_path / "single"
-    write_tree(single, *generate_files(scenario.structure(), scenario.values(), real="float"))
+    write_tree(single, *generate_files(bind(scenario.structure(), scenario.values(), real="float")))
     report = make("cortex_m", tmp_path / "build", "firmware", f"FLOAT={single}")
     m7, m4f = report.split("Cortex-M4F")
     for board in (m7, m4f):

@@ -44,6 +44,6 @@ def build(mode: problem.Control, extra: tuple[str, ...]) -> problem.Runner:
 
 CONTENDERS = tuple(
     problem.Contender(name, mode, mode, partial(build, mode, extra), batch=4, compiles=True)
-    for name, extra in (("CasADi C", ()), ("CasADi C, -ffast-math", ("-ffast-math",)))
+    for name, extra in (("CasADi C", ()), ("CasADi C, -ffast-math", problem.FAST_MATH))
     for mode in problem.MODES
 )

@@ -48,7 +48,7 @@ CONTENDERS = tuple(
         batch=batch,
         compiles=batch > 1,
     )
-    for note, extra in (("", ()), (", -ffast-math", ("-ffast-math",)))
+    for note, extra in (("", ()), (", -ffast-math", problem.FAST_MATH))
     for mode in problem.MODES
     for variant, batch in ((mode, 8), (f"{mode}, one run", 1))
 )

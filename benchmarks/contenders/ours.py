@@ -12,7 +12,7 @@ import numpy as np
 from springline.benchmarks import problem
 from springline.codegen import toolchain
 from springline.codegen.kernel import Kernel, KernelOptions, LoopSettings, kernel
-from springline.codegen.kernel_source import best_flags
+from springline.codegen.kernel_source import ONE_RUN, best_flags
 from springline.codegen.program import program
 from springline.model.system import SignalShape, Structure
 
@@ -122,7 +122,7 @@ def contenders() -> tuple[problem.Contender, ...]:
         result.append(problem.Contender(NAME, f"{mode}, FMA allowed", mode, partial(build_fused, mode), batch=BATCH))
         if cores > 1:
             result.append(_contender(f"{mode}, {cores} threads", mode, DEFAULT, threads=cores))
-        result.append(_contender(f"{mode}, one run", mode, replace(DEFAULT, width=1), batch=1))
+        result.append(_contender(f"{mode}, one run", mode, replace(ONE_RUN, tunable=DEFAULT.tunable), batch=1))
         result.append(_contender(f"{mode}, casadi engine", mode, KernelOptions(engine="casadi"), batch=1))
     return tuple(result)
 

@@ -62,7 +62,7 @@ static const double *uniform_at(sl_clock *clock, int64_t j) {
   if (SL_NU > 0 && clock->block[slot] != block) {
     int part, i;
     for (part = 0; part < SL_BLOCK / SL_W; part++) {
-      double t[SL_W], d[SL_W * (SL_ND + 1)];
+      double t[SL_W], d[SL_W * (SL_ND + 1)] = {0.0}; /* without tables nothing reads d */
       for (i = 0; i < SL_W; i++) {
         t[i] = half_step_time(clock->job, block * SL_BLOCK + part * SL_W + i);
         table_data(clock->job->tables, t[i], d + i, SL_W);
@@ -102,7 +102,7 @@ static sl_time time_at(sl_pack *pack, int64_t j, sl_group *varying) {
   now.uniform = uniform_at(pack->clock, j);
   now.varying = (const sl_group *)varying;
   if (SL_NV > 0) {
-    double d[SL_ND + 1];
+    double d[SL_ND + 1] = {0.0}; /* likewise */
     const double t = half_step_time(pack->job, j);
     table_data(pack->job->tables, t, d, 1);
     kernel_varying(t, d, now.uniform, (const sl_group *)pack->p, (const sl_group *)pack->r, varying);

@@ -103,12 +103,19 @@ def _describe(plan: Plan, cost: Estimate, pool: Pool, destination: str, *, as_js
     rows = [
         ["runs", f"{plan.runs:,}"],
         ["groups", f"{len(plan.groups)}"],
-        ["chunks", f"{plan.chunks:,} of {plan.chunk_size:,} runs"],
+        ["chunks", _chunks_text(plan)],
         ["threads", f"{pool.threads}"],
         ["size", f"about {size_text(cost.bytes)} in {destination}"],
         ["time", f"about {time_text(cost.seconds)}, less where runs diverge"],
     ]
     print_table(["sweep", plan.sweep.source], rows)
+
+
+def _chunks_text(plan: Plan) -> str:
+    """How many chunks there are, of how many runs: the last one of a group may be smaller."""
+    largest = min(plan.chunk_size, max(group.runs for group in plan.groups))
+    most = "" if plan.chunks * largest == plan.runs else "up to "
+    return f"{plan.chunks:,} of {most}{largest:,} run{'s' if largest > 1 else ''}"
 
 
 def _warn(cost: Estimate, again: str) -> None:
@@ -255,8 +262,14 @@ def replay(
 
 
 def time_text(seconds: float) -> str:
-    """A duration for people: "40 s", "12 min", "3.5 h", "2.1 days"."""
-    scales = ((90.0, 1.0, "s"), (5400.0, 60.0, "min"), (172800.0, 3600.0, "h"), (math.inf, 86400.0, "days"))
+    """A duration for people: "7 ms", "40 s", "12 min", "3.5 h", "2.1 days"."""
+    scales = (
+        (0.1, 1e-3, "ms"),
+        (90.0, 1.0, "s"),
+        (5400.0, 60.0, "min"),
+        (172800.0, 3600.0, "h"),
+        (math.inf, 86400.0, "days"),
+    )
     unit, name = next((unit, name) for limit, unit, name in scales if seconds < limit)
     return f"{seconds / unit:.2g} {name}" if seconds / unit < 10 else f"{seconds / unit:.0f} {name}"
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from springline.runner.commands.run import refuse_files
 from springline.runner.errors import InputError, Problem
 from springline.runner.terminal import print_json, print_table, progress, say
 
@@ -37,8 +38,7 @@ def bench(
     from springline.runner.bench import COLUMNS, OUTPUTS, files, machine_lines, plain, table
     from springline.runner.storage import write_folder
 
-    if output.exists() and not output.is_dir():
-        raise InputError(Problem(str(output), "", "is a file where a folder was expected; choose another with -o"))
+    refuse_files(output)
     chosen = _chosen(only, CONTENDERS)
     with progress("measuring", quiet=as_json) as report:
         result = measure(QUICK if quick else Effort(), chosen, report)
@@ -59,12 +59,12 @@ def _chosen(only: str, contenders: Sequence[Contender]) -> list[Contender]:
     from springline.benchmarks.contenders.ours import is_default
 
     words = [word.strip().lower() for word in only.split(",") if word.strip()] or [""]
-    names = tuple(dict.fromkeys(contender.name for contender in contenders))
-    unknown = [word for word in words if not any(word in name.lower() for name in names)]
-    if unknown:
-        raise InputError(
-            *(Problem("--only", "", "must be part of a contender's name", word, word, names) for word in unknown)
-        )
+    # Some names contain a comma themselves: what can be asked for is what stands between commas.
+    known = tuple(dict.fromkeys(word for contender in contenders for word in contender.name.split(", ")))
+    wrong = [word for word in words if not any(word in name.lower() for name in known)]
+    if wrong:
+        text = "expected a contender's name, or a part of it"
+        raise InputError(*(Problem("--only", "", text, repr(word), word, known) for word in wrong))
     return [
         contender
         for contender in contenders

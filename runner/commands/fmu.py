@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 import re
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from springline.codegen.manifest import MANIFEST, write_tree
+from springline.codegen.manifest import read_manifest, write_tree
+from springline.runner.commands.options import TUNABLE, AsJson, Force, ScenarioName, tunable_names
 from springline.runner.commands.run import refuse_files
 from springline.runner.errors import InputError, Problem
 from springline.runner.terminal import print_json, say
+
+if TYPE_CHECKING:
+    from springline.codegen.fmu import Settings
+    from springline.runner.scenario import Scenario
+
+_KIND = "fmu"
 
 
 class Part(StrEnum):
@@ -26,7 +33,6 @@ class Part(StrEnum):
     loop = "loop"
 
 
-ScenarioName = Annotated[str, typer.Argument(help="A TOML file, or the name of a packaged scenario.")]
 PartOption = Annotated[
     Part, typer.Option("--part", help="The control law, the arm, or both of them with the scenario's reference.")
 ]
@@ -37,114 +43,89 @@ Name = Annotated[
 ]
 Tunable = Annotated[
     str,
-    typer.Option(
-        metavar="NAMES|all|none", help="Parameters that the FMU shows, comma-separated; the rest are constants."
-    ),
+    typer.Option(metavar=TUNABLE, help="Parameters that the FMU shows, comma-separated; the rest are constants."),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace files that springline did not write.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")]
 
 
-def export_fmu2(
-    scenario: ScenarioName,
-    part: PartOption,
-    output: Output = Path("fmu"),
-    name: Name = None,
-    tunable: Tunable = "all",
-    force: Force = False,
-    as_json: AsJson = False,
-) -> None:
-    """Write an FMU for Co-Simulation, FMI 2.0."""
-    _export(2, scenario, part, output, name, tunable, force, as_json)
+def _command(version: Literal[2, 3]) -> Callable[..., None]:
+    """The command `springline export fmu2` or `fmu3`."""
+
+    def command(
+        scenario: ScenarioName,
+        part: PartOption,
+        output: Output = Path("fmu"),
+        name: Name = None,
+        tunable: Tunable = "all",
+        force: Force = False,
+        as_json: AsJson = False,
+    ) -> None:
+        from springline.codegen.fmu import fmu
+        from springline.runner.scenario import load_scenario
+        from springline.runner.simulate import kernel_tables
+
+        refuse_files(output)
+        others = _earlier(output, keep_edited=force)
+        loaded = load_scenario(scenario)
+        stem = re.sub(r"\W", "_", Path(scenario).stem, flags=re.ASCII)
+        identifier = name or f"{stem if stem[:1].isalpha() else f'scenario_{stem}'}_{part}_fmi{version}"
+        try:
+            content = fmu(
+                loaded.structure(),
+                loaded.values(),
+                _settings(loaded),
+                part=part.value,
+                version=version,
+                identifier=identifier,
+                name=f"springline {stem} {part}",
+                tables=kernel_tables(loaded.tables()),
+                tunable=tunable_names(tunable),
+            )
+        except ValueError as error:  # the scenario's numbers are in their bounds, so this is --tunable or --name
+            raise InputError(Problem(f"springline export fmu{version}", "", str(error))) from error
+        path = f"{identifier}.fmu"
+        entry = {"name": path, "fmi": f"{version}.0", "part": part.value, "scenario": stem}
+        others.pop(path, None)
+        kept = {name: (output / name).read_bytes() for name in others}
+        manifest = {"kind": _KIND, "fmus": sorted([*others.values(), entry], key=lambda fmu: str(fmu["name"]))}
+        changes = write_tree(output, {**kept, path: content}, manifest, force=force)
+        done = "written" if path in changes.written else "unchanged"
+        if as_json:
+            print_json(f"export fmu{version}", [{"path": path, "change": done}], {})
+        else:
+            say(f"{output / path}: FMI {version}.0, {len(content) // 1024} KiB, {done}")
+
+    command.__doc__ = f"Write an FMU for Co-Simulation, FMI {version}.0."
+    return command
 
 
-def export_fmu3(
-    scenario: ScenarioName,
-    part: PartOption,
-    output: Output = Path("fmu"),
-    name: Name = None,
-    tunable: Tunable = "all",
-    force: Force = False,
-    as_json: AsJson = False,
-) -> None:
-    """Write an FMU for Co-Simulation, FMI 3.0."""
-    _export(3, scenario, part, output, name, tunable, force, as_json)
+export_fmu2 = _command(2)
+export_fmu3 = _command(3)
 
 
-def _export(
-    version: Any,
-    scenario: str,
-    part: Part,
-    output: Path,
-    name: str | None,
-    tunable: str,
-    force: bool,
-    as_json: bool,
-) -> None:
-    from springline.codegen.fmu import Settings, fmu
-    from springline.runner.scenario import load_scenario
-    from springline.runner.simulate import kernel_tables
+def _settings(scenario: Scenario) -> Settings:
+    from springline.codegen.fmu import Settings
 
-    command = f"export fmu{version}"
-    refuse_files(output)
-    others = _earlier(command, output, keep_edited=force)
-    loaded = load_scenario(scenario)
-    stem = re.sub(r"\W", "_", Path(scenario).stem, flags=re.ASCII)
-    identifier = name or f"{stem if stem[:1].isalpha() else f'scenario_{stem}'}_{part}_fmi{version}"
-    names: Any = tunable if tunable in {"all", "none"} else [key.strip() for key in tunable.split(",")]
-    document = loaded.document
-    ending = [table for table in loaded.tables() if table.ends == "error"]
-    sampled = document["control"]["mode"] == "sampled"
-    settings = Settings(
-        duration=float(document["simulation"]["duration"]),
-        step=loaded.step,
-        period=float(document["control"]["period"]) if sampled else 0.0,
-        bound=loaded.bound,
+    simulation, control = scenario.document["simulation"], scenario.document["control"]
+    ending = [table for table in scenario.tables() if table.ends == "error"]
+    return Settings(
+        duration=float(simulation["duration"]),
+        step=scenario.step,
+        period=float(control["period"]) if control["mode"] == "sampled" else 0.0,
+        bound=scenario.bound,
         since=max((table.t0 for table in ending), default=-math.inf),
         until=min((table.end for table in ending), default=math.inf),
     )
-    try:
-        content = fmu(
-            loaded.structure(),
-            loaded.values(),
-            settings,
-            part=part.value,
-            version=version,
-            identifier=identifier,
-            name=f"springline {stem} {part}",
-            tables=kernel_tables(loaded.tables()),
-            tunable=names,
-        )
-    except ValueError as error:  # the scenario's numbers are in their bounds, so this is --tunable or --name
-        raise InputError(Problem(f"springline {command}", "", str(error))) from error
-    path = f"{identifier}.fmu"
-    entry = {"name": path, "fmi": f"{version}.0", "part": part.value, "scenario": stem}
-    others.pop(path, None)
-    kept = {name: (output / name).read_bytes() for name in others}
-    manifest = {"fmus": sorted([*others.values(), entry], key=lambda fmu: str(fmu["name"]))}
-    changes = write_tree(output, {**kept, path: content}, manifest, force=force)
-    done = "written" if path in changes.written else "unchanged"
-    if as_json:
-        print_json(command, [{"path": path, "change": done}], {})
-    else:
-        say(f"{output / path}: FMI {version}.0, {len(content) // 1024} KiB, {done}")
 
 
-def _earlier(command: str, folder: Path, *, keep_edited: bool) -> dict[str, dict[str, str]]:
+def _earlier(folder: Path, *, keep_edited: bool) -> dict[str, dict[str, str]]:
     """What the folder's manifest says of FMUs that are still there, by file name: those that are as they were written.
 
     One that was edited is in the way (write_tree says so), unless it is asked to be kept.
-    Raises InputError if the folder belongs to an export of another kind.
+    Raises FolderConflict if the folder belongs to another command.
     """
-    try:
-        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError):
+    manifest = read_manifest(folder, _KIND)
+    if manifest is None:
         return {}
-    except ValueError:  # no manifest of ours: write_tree says so
-        return {}
-    if not isinstance(manifest, dict) or "fmus" not in manifest:
-        text = f"{folder} holds something else than FMUs (its {MANIFEST} says so): choose another folder with -o"
-        raise InputError(Problem(f"springline {command}", "", text))
     written = {entry["path"]: entry["sha256"] for entry in manifest["files"]}
 
     def stays(name: str) -> bool:

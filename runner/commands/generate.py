@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from springline.codegen.manifest import MANIFEST, Stale, check_tree, summary, write_tree
+from springline.runner.commands.options import TUNABLE, AsJson, Force, ScenarioName, tunable_names
 from springline.runner.commands.run import refuse_files
 from springline.runner.errors import InputError, Problem
 from springline.runner.terminal import print_json, say
@@ -28,7 +30,7 @@ Check = Annotated[bool, typer.Option("--check", help="Write nothing; exit 1 and 
 Tunable = Annotated[
     str,
     typer.Option(
-        metavar="NAMES|all|none",
+        metavar=TUNABLE,
         help=(
             "Parameters that stay variables of the C, comma-separated: control.k1,control.mu; the rest are constants."
         ),
@@ -36,69 +38,58 @@ Tunable = Annotated[
 ]
 Prefix = Annotated[str, typer.Option(metavar="NAME", help="What every C symbol begins with.")]
 RealType = Annotated[Real, typer.Option(help="C type of every number.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace files that springline did not write.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print what was done to each file as JSON.")]
 
 
-def generate(
-    scenario: Annotated[str, typer.Argument(help="A TOML file, or the name of a packaged scenario.")] = DEFAULT,
-    output: Output = Path("generated"),
-    check: Check = False,
-    tunable: Tunable = "none",
-    prefix: Prefix = "springline",
-    real: RealType = Real.double,
-    force: Force = False,
-    as_json: AsJson = False,
+def _command(name: str, description: str, default: Any = ...) -> Callable[..., None]:
+    """The command `springline NAME`; `default` is the scenario when none is given, and `...` if one has to be."""
+
+    def command(
+        scenario: ScenarioName = default,
+        output: Output = Path("generated"),
+        check: Check = False,
+        tunable: Tunable = "none",
+        prefix: Prefix = "springline",
+        real: RealType = Real.double,
+        force: Force = False,
+        as_json: AsJson = False,
+    ) -> None:
+        from springline.codegen.api import generate_files
+        from springline.codegen.export import bind
+        from springline.runner.scenario import load_scenario
+
+        refuse_files(output)
+        loaded = load_scenario(scenario)
+        names = tunable_names(tunable)
+        try:
+            export = bind(loaded.structure(), loaded.values(), tunable=names, prefix=prefix, real=real.value)
+        except ValueError as error:  # the scenario's numbers are in their bounds, so this is --tunable or --prefix
+            raise InputError(Problem(f"springline {name}", "", str(error))) from error
+        files, manifest = generate_files(export)
+        if check:
+            _report_check(name, output, check_tree(output, files, manifest), len(files), as_json)
+        else:
+            _write(name, output, files, manifest, force, as_json)
+
+    command.__doc__ = description
+    return command
+
+
+generate = _command(
+    "generate",
+    "Generate C for a scenario: controller, plant and the functions of the model, its parameters as constants.",
+    DEFAULT,
+)
+export_c = _command("export c", "The same files as `springline generate SCENARIO`.")
+
+
+def _write(
+    name: str, output: Path, files: dict[str, bytes], manifest: dict[str, Any], force: bool, as_json: bool
 ) -> None:
-    """Generate C for a scenario: controller, plant and the functions of the model, its parameters as constants."""
-    _generate("generate", scenario, output, check, tunable, prefix, real, force, as_json)
-
-
-def export_c(
-    scenario: Annotated[str, typer.Argument(help="A TOML file, or the name of a packaged scenario.")],
-    output: Output = Path("generated"),
-    check: Check = False,
-    tunable: Tunable = "none",
-    prefix: Prefix = "springline",
-    real: RealType = Real.double,
-    force: Force = False,
-    as_json: AsJson = False,
-) -> None:
-    """The same files as `springline generate SCENARIO`."""
-    _generate("export c", scenario, output, check, tunable, prefix, real, force, as_json)
-
-
-def _generate(
-    command: str,
-    scenario: str,
-    output: Path,
-    check: bool,
-    tunable: str,
-    prefix: str,
-    real: Real,
-    force: bool,
-    as_json: bool,
-) -> None:
-    from springline.codegen.api import generate_files
-    from springline.runner.scenario import load_scenario
-
-    refuse_files(output)
-    loaded = load_scenario(scenario)
-    names: Any = tunable if tunable in {"all", "none"} else [name.strip() for name in tunable.split(",")]
-    try:
-        files, manifest = generate_files(
-            loaded.structure(), loaded.values(), tunable=names, prefix=prefix, real=real.value
-        )
-    except ValueError as error:  # the scenario's numbers are in their bounds, so this is --tunable or --prefix
-        raise InputError(Problem(f"springline {command}", "", str(error))) from error
-    if check:
-        _report_check(command, output, check_tree(output, files, manifest), as_json)
-        return
     changes = write_tree(output, files, manifest, force=force)
     if as_json:
         done = {**dict.fromkeys(changes.written, "written"), **dict.fromkeys(changes.removed, "removed")}
         paths = sorted({*files, MANIFEST, *changes.removed})
-        print_json(command, [{"path": path, "change": done.get(path, "unchanged")} for path in paths], {})
+        print_json(name, [{"path": path, "change": done.get(path, "unchanged")} for path in paths], {})
         return
     for path in changes.written:
         say(f"  wrote   {path}")
@@ -107,9 +98,11 @@ def _generate(
     say(f"{output} is up to date: {len(files) + 1} files, {len(changes.written)} written")
 
 
-def _report_check(command: str, output: Path, stale: list[Stale], as_json: bool) -> None:
+def _report_check(name: str, output: Path, stale: list[Stale], files: int, as_json: bool) -> None:
     if as_json:
-        print_json(command, [entry._asdict() for entry in stale], {}, "stale" if stale else "ok")
+        print_json(name, [entry._asdict() for entry in stale], {}, "stale" if stale else "ok")
+    elif len(stale) == files + 1 and all(entry.kind == "missing" for entry in stale):
+        say(f"{output} holds no generated files: the same command without --check writes them")
     else:
         say(summary(output, stale))
     if stale:

@@ -68,7 +68,7 @@ def run(
     from springline.runner.simulate import simulate
     from springline.runner.storage import table_files, units, write_folder
 
-    loaded = load_scenario(scenario, dict(parse_set(change) for change in changes or []))
+    loaded = load_scenario(scenario, dict(parse_set(change, scenario) for change in changes or []))
     packaged = scenario in packaged_scenarios()
     folder = output or Path("results", scenario if packaged else Path(scenario).stem)
     refuse_occupied(folder, force=force)

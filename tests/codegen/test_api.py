@@ -45,7 +45,7 @@ DATE_OR_PLACE = "|".join([r"\b20\d\d-\d\d-\d\d\b", *(f"/{top}/" for top in ("hom
 
 @pytest.fixture(scope="module")
 def nominal() -> tuple[dict[str, bytes], dict]:
-    return generate_files(STRUCTURE, VALUES, tunable="none")
+    return generate_files(bind(STRUCTURE, VALUES, tunable="none"))
 
 
 def changed(key: str, value: float) -> np.ndarray:
@@ -96,9 +96,10 @@ def test_no_placeholder_is_left(nominal: tuple[dict[str, bytes], dict]) -> None:
 def test_the_same_bytes_from_another_process_and_folder(nominal: tuple[dict[str, bytes], dict], tmp_path: Path) -> None:
     code = (
         "import hashlib\nfrom springline.codegen.api import generate_files\n"
+        "from springline.codegen.export import bind\n"
         "from springline.codegen.manifest import canonical_json\nfrom springline.runner import load_scenario\n"
         "s = load_scenario('paper/nominal')\n"
-        "files, manifest = generate_files(s.structure(), s.values(), tunable='none')\n"
+        "files, manifest = generate_files(bind(s.structure(), s.values(), tunable='none'))\n"
         "content = {path: hashlib.sha256(text).hexdigest() for path, text in files.items()}\n"
         "print(hashlib.sha256(canonical_json({'files': content, 'manifest': manifest})).hexdigest())\n"
     )
@@ -129,7 +130,7 @@ def test_manifest(nominal: tuple[dict[str, bytes], dict]) -> None:
 
 def test_a_changed_parameter_changes_its_reads_and_no_other_code(nominal: tuple[dict[str, bytes], dict]) -> None:
     old, old_manifest = nominal
-    new, new_manifest = generate_files(STRUCTURE, changed("control.k1", 3.25), tunable="none")
+    new, new_manifest = generate_files(bind(STRUCTURE, changed("control.k1", 3.25), tunable="none"))
     assert old_manifest["hash"] != new_manifest["hash"]
     for path in ("include/springline.h", "src/springline_model.h", "main.c", "self_check.c", "CMakeLists.txt"):
         assert differing_lines(old[path], new[path]) == [], path
@@ -159,14 +160,14 @@ def test_a_changed_parameter_changes_its_reads_and_no_other_code(nominal: tuple[
 
 
 def test_a_changed_law_changes_vectors_readme_and_hash(nominal: tuple[dict[str, bytes], dict]) -> None:
-    new, manifest = generate_files(replace(STRUCTURE, law="power"), VALUES, tunable="none")
+    new, manifest = generate_files(bind(replace(STRUCTURE, law="power"), VALUES, tunable="none"))
     assert manifest["hash"] != nominal[1]["hash"]
     for path in ("test_vectors.txt", "README.md", "src/springline.c", "src/springline_model.c"):
         assert differing_lines(nominal[0][path], new[path]), path
 
 
 def test_binding_moves_parameters_between_code_and_argument() -> None:
-    files, manifest = generate_files(STRUCTURE, VALUES, tunable=["control.mu", "plant.m3"])
+    files, manifest = generate_files(bind(STRUCTURE, VALUES, tunable=["control.mu", "plant.m3"]))
     run = [item["name"] for item in manifest["parameters"] if item["binding"] == "run"]
     assert run == ["plant.m3", "control.mu.0", "control.mu.1"]
     control = next(item for item in manifest["functions"] if item["name"] == "springline_control")
@@ -174,7 +175,7 @@ def test_binding_moves_parameters_between_code_and_argument() -> None:
     header = files["include/springline.h"].decode()
     assert "springline_real control_mu_lift;" in header
     assert "springline_parameters parameters;" in header
-    assert "springline_parameters" not in generate_files(STRUCTURE, VALUES)[0]["include/springline.h"].decode()
+    assert "springline_parameters" not in generate_files(bind(STRUCTURE, VALUES))[0]["include/springline.h"].decode()
 
 
 @pytest.mark.parametrize(
@@ -192,7 +193,7 @@ def test_binding_moves_parameters_between_code_and_argument() -> None:
 )
 def test_refusals_name_the_cause(arguments: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        generate_files(STRUCTURE, **({"values": VALUES, "tunable": "none"} | arguments))
+        bind(STRUCTURE, **({"values": VALUES, "tunable": "none"} | arguments))
 
 
 # --- baking --------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from springline.codegen.api import generate_files
+from springline.codegen.export import bind
 from springline.codegen.kernel import KernelOptions, LoopSettings, kernel
 from springline.codegen.manifest import write_tree
 from springline.codegen.typed import STATUS
@@ -43,7 +44,7 @@ def export(tmp_path_factory: pytest.TempPathFactory) -> Folder:
     def folder(name: str) -> tuple[Path, str]:
         options = EXPORTS[name]
         if not (root / name).exists():
-            write_tree(root / name, *generate_files(scenario.structure(), scenario.values(), **options))
+            write_tree(root / name, *generate_files(bind(scenario.structure(), scenario.values(), **options)))
         return root / name, options.get("prefix", "springline")
 
     return folder
@@ -478,7 +479,7 @@ def test_the_exported_loop_gives_the_simulators_bits(scenario: str, tunable: str
     """main.c: control at 1 kHz, plant steps of 0.1 ms, against the sampled loop with the same rates, bit for bit."""
     loaded = load_scenario(scenario)
     structure, numbers = loaded.structure(), loaded.values()
-    write_tree(tmp_path / "c", *generate_files(structure, numbers, tunable=tunable))
+    write_tree(tmp_path / "c", *generate_files(bind(structure, numbers, tunable=tunable)))
     units = [tmp_path / "c" / "src" / "springline.c", tmp_path / "c" / "main.c"]
     program = compile_c("cc", units, tmp_path / "main", *FLAGS)
     printed = columns(run(program, "1"))
@@ -533,7 +534,7 @@ def test_single_precision_step_by_step(library: Callable[[str], Library], export
 def test_single_precision_keeps_a_parameter_that_looks_like_a_guard(tmp_path: Path) -> None:
     """700 is where the model caps exponents, and 85 where floats have to; as a limit of a motor it stays 700."""
     loaded = load_scenario("paper/nominal", {"control.U_max": [700.0, 350.0]})
-    write_tree(tmp_path / "c", *generate_files(loaded.structure(), loaded.values(), real="float"))
+    write_tree(tmp_path / "c", *generate_files(bind(loaded.structure(), loaded.values(), real="float")))
     case = Case(Library(tmp_path / "c", "springline", tmp_path / "c.so"))
     case.measurement.q1_lift = 1.5
     assert case.step() == "OK"
@@ -543,7 +544,7 @@ def test_single_precision_keeps_a_parameter_that_looks_like_a_guard(tmp_path: Pa
 def test_structures_of_tables_export_without_their_data(tmp_path: Path) -> None:
     """A base motion from a table is an input of the C; the export's own signals leave it at zero and say so."""
     loaded = load_scenario("ship/vessel_10hz")
-    write_tree(tmp_path / "c", *generate_files(loaded.structure(), loaded.values()))
+    write_tree(tmp_path / "c", *generate_files(bind(loaded.structure(), loaded.values())))
     assert "table is not part of the export" in (tmp_path / "c" / "include" / "springline.h").read_text()
     units = sources(tmp_path / "c", "springline", "self_check.c")
     run(compile_c("cc", units, tmp_path / "check", *WARNINGS, "-O1"), tmp_path / "c" / "test_vectors.txt")
@@ -554,6 +555,6 @@ def test_structures_of_tables_export_without_their_data(tmp_path: Path) -> None:
 def test_every_law_exports(law: str, form: Any, tmp_path: Path) -> None:
     loaded = load_scenario("paper/nominal")
     structure = replace(loaded.structure(), law=law if form == "power" else "variable_power_log", log_form=form)
-    write_tree(tmp_path / "c", *generate_files(structure, loaded.values(), tunable=["control.alpha"]))
+    write_tree(tmp_path / "c", *generate_files(bind(structure, loaded.values(), tunable=["control.alpha"])))
     units = sources(tmp_path / "c", "springline", "self_check.c")
     run(compile_c("cc", units, tmp_path / "check", *WARNINGS, "-O1"), tmp_path / "c" / "test_vectors.txt")

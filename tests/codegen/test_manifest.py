@@ -51,6 +51,23 @@ def folder(tmp_path: Path) -> Path:
     return place
 
 
+# --- whose folder it is ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("there", "asked"), [({}, {"kind": "b"}), ({"kind": "a"}, {}), ({"kind": "a"}, {"kind": "b"})])
+def test_a_folder_of_another_kind_is_left_alone(tmp_path: Path, there: dict[str, str], asked: dict[str, str]) -> None:
+    write_tree(tmp_path, OLD, there)
+    before = contents(tmp_path)
+    for force in (False, True):
+        with pytest.raises(FolderConflict, match=r"manifest\.json: lists what another command wrote"):
+            write_tree(tmp_path, NEW, asked, force=force)
+    with pytest.raises(FolderConflict, match=r"manifest\.json: lists what another command wrote"):
+        check_tree(tmp_path, NEW, asked)
+    assert contents(tmp_path) == before
+    write_tree(tmp_path, NEW, there)
+    assert contents(tmp_path).keys() == {*NEW, "manifest.json"}
+
+
 # --- writing ---------------------------------------------------------------------------------------------
 
 

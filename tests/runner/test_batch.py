@@ -119,13 +119,49 @@ def test_a_sweep_a_python_batch_and_single_runs_agree_to_the_last_bit(sweep: Pat
         assert one.metrics.to_pylist()[0] == {name: table[name][row].as_py() for name in one.metrics.column_names}
 
 
-def test_python_batch_refuses_columns_that_do_not_fit() -> None:
-    scenario = load_scenario("paper/nominal")
-    for columns in ({}, {"control.k1": []}, {"control.k1": [1.0], "control.k2": [1.0, 2.0]}):
-        with pytest.raises(ValueError, match="non-empty arrays of one length"):
-            batch(scenario, columns)
-    with pytest.raises(InputError, match=r"control\.k1"):
-        batch(scenario, {"control.k": [1.0]})
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        ({}, "non-empty arrays of one length"),
+        ({"control.k1": []}, "non-empty arrays of one length"),
+        ({"control.k1": [1.0], "control.k2": [1.0, 2.0]}, "non-empty arrays of one length"),
+        ({"control.k": [1.0]}, r"unknown numeric key.*control\.k1"),
+        ({"control.law": ["power"]}, r"control\.law: unknown numeric key"),
+        ({"control.k1": ["1.0"]}, r"control\.k1: expected a column of numbers"),
+        ({"control.k1": [True]}, r"control\.k1: expected a column of numbers"),
+        ({"control.k1": [[1.0], [1.0, 2.0]]}, r"control\.k1: expected a column of numbers"),
+        ({"control.k1": [-1.0]}, r"control\.k1: run 0: expected a number > 0"),
+    ],
+)
+def test_python_batch_refuses_columns_that_do_not_fit(columns: dict[str, Any], expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        batch(load_scenario("paper/nominal"), columns)
+
+
+def test_python_batch_takes_whole_numbers() -> None:
+    scenario = load_scenario("paper/nominal", {"simulation.duration": 0.002})
+    whole, real = (batch(scenario, {"control.k1": values}, jobs=1) for values in ([3, 4], np.array([3.0, 4.0])))
+    assert whole.equals(real, check_metadata=True)
+
+
+@pytest.mark.parametrize("columns", [[], None, "control.k1", [("control.k1", [1.0])], {1: [1.0]}])
+def test_python_batch_refuses_columns_of_another_kind(columns: Any) -> None:
+    with pytest.raises(TypeError, match="expected columns such as"):
+        batch(load_scenario("paper/nominal"), columns)
+
+
+@pytest.mark.parametrize(("jobs", "error"), [("2", TypeError), (1.5, TypeError), (0, ValueError), (-1, ValueError)])
+def test_python_batch_refuses_jobs_that_are_no_number_of_threads(jobs: Any, error: type[Exception]) -> None:
+    with pytest.raises(error, match=r"jobs is .+, expected"):
+        batch(load_scenario("paper/nominal"), {"control.k1": [1.0]}, jobs=jobs)
+
+
+@pytest.mark.parametrize("call", [simulate, lambda scenario: batch(scenario, {"control.k1": [1.0]})])
+def test_a_name_is_no_scenario_and_the_remedy_is_told(call: Callable[[Any], object]) -> None:
+    with pytest.raises(TypeError, match=r"expected a Scenario, got 'paper/nominal': load_scenario\('paper/nominal'\)"):
+        call("paper/nominal")
+    with pytest.raises(TypeError, match=r"expected a Scenario, got None$"):
+        call(None)
 
 
 def test_groups_differ_in_structure_and_timing(tmp_path: Path) -> None:
@@ -367,6 +403,21 @@ def test_replay_is_bit_identical_and_notices_what_is_not(sweep: Path, tmp_path: 
     assert command("replay", tmp_path, 0, "-o", tmp_path / "none").exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("head", "expected"),
+    [
+        ("samples = 1", "1 of 1 run"),
+        ("samples = 33\nchunk = 32", "2 of up to 32 runs"),
+        ("samples = 2048\nchunk = 1024", "2 of 1,024 runs"),
+    ],
+)
+def test_dry_run_tells_the_size_of_chunks(head: str, expected: str, tmp_path: Path, command: Command) -> None:
+    file = tmp_path / "sweep.toml"
+    file.write_text(f"{head}\n[set]\nsimulation.duration = 0.002\n[vary]\ncontrol.k1 = {{ uniform = [1, 2] }}\n")
+    said = command("batch", file, "-o", tmp_path / "data", "--dry-run").stdout
+    assert re.search(rf"chunks +{expected} *\n", said), said
+
+
 def test_dry_run_writes_nothing_and_its_size_is_about_right(sweep: Path, tmp_path: Path, command: Command) -> None:
     folder = tmp_path / "data"
     done = command("batch", sweep, "-o", folder, "--dry-run", "--json")
@@ -514,7 +565,8 @@ def test_rank_correlation_is_spearmans_within_groups() -> None:
 
 
 def test_sizes_and_times_are_for_people() -> None:
-    assert [time_text(s) for s in (0.123, 40, 600, 20_000, 400_000)] == [
+    assert [time_text(s) for s in (0.0072, 0.123, 40, 600, 20_000, 400_000)] == [
+        "7.2 ms",
         "0.12 s",
         "40 s",
         "10 min",

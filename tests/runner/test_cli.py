@@ -19,11 +19,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from springline.benchmarks.contenders import CONTENDERS
 from springline.codegen.kernel import kernel
+from springline.codegen.manifest import write_tree
 from springline.model.sliding import LAWS
 from springline.runner import paper, terminal
 from springline.runner.claims import Check, Finding
 from springline.runner.cli import app
+from springline.runner.commands import bench
 from springline.runner.commands import run as run_command
 from springline.runner.scenario import load_scenario, packaged_scenarios
 from springline.runner.simulate import simulate
@@ -192,9 +195,12 @@ def test_a_run_that_diverges_is_a_result() -> None:
     [
         (["nowhere.toml"], "nowhere.toml"),
         (["paper/group1_shak"], "did you mean 'paper/group1_shake'?"),
-        (["short.toml", "--set", "control.delt=0.1"], "did you mean 'delta'?"),
-        (["short.toml", "--set", "control.delta"], "expected KEY=VALUE"),
-        (["short.toml", "--set", "control.law=power"], "quotes"),
+        (
+            ["short.toml", "--set", "control.delt=0.1"],
+            "override of short.toml: control.delt: unknown key, got 'delt'; ",
+        ),
+        (["short.toml", "--set", "control.delta"], "override of short.toml: expected --set KEY=VALUE"),
+        (["short.toml", "--set", "control.law=power"], "override of short.toml: control.law: expected a TOML value"),
         (["short.toml", "--set", "mechanism.m3=-1.0"], "mechanism.m3: expected a number > 0 [kg]"),
         (["short.toml", "--set", "simulation.duration=0.50005"], "whole multiple"),
         (["short.toml", "--format", "xlsx"], "xlsx"),
@@ -378,6 +384,23 @@ def test_check_names_what_is_stale_and_writes_nothing(generated: Path) -> None:
     assert contents(generated) == before
 
 
+def test_check_of_a_folder_without_generated_files_is_one_sentence(elsewhere: Path) -> None:
+    result = springline("generate", "--check")
+    assert result.exit_code == 1
+    assert result.stdout == "generated holds no generated files: the same command without --check writes them\n"
+    rows = json.loads(springline("generate", "--check", "--json").stdout)["rows"]
+    assert {row["kind"] for row in rows} == {"missing"}
+    assert list(contents(elsewhere)) == ["short.toml"]
+
+
+@pytest.mark.parametrize("options", [[], ["--check"], ["--force"]])
+def test_generate_leaves_the_folder_of_another_command_alone(options: list[str]) -> None:
+    write_tree(Path("out"), {"report.md": b"# numbers"}, {"kind": "reproduction"})
+    before = contents(Path("out"))
+    assert "manifest.json: lists what another command wrote" in refused("generate", "-o", "out", *options)
+    assert contents(Path("out")) == before
+
+
 def test_generate_replaces_its_own_files_only() -> None:
     rows = json.loads(done("generate", "-o", "c", "--json"))["rows"]
     assert {row["change"] for row in rows} == {"written"}
@@ -411,6 +434,20 @@ def test_generate_renames_and_frees_what_it_is_told_to() -> None:
 )
 def test_generate_refuses_wrong_input(elsewhere: Path, arguments: list[str], told: str) -> None:
     assert told in refused("generate", *arguments)
+    assert list(contents(elsewhere)) == ["short.toml"]
+
+
+# --- bench -----------------------------------------------------------------------------------------------
+
+
+def test_bench_says_which_contenders_there_are(elsewhere: Path) -> None:
+    told = refused("bench", "--only", "numba, nobody, nemo")
+    listed = re.findall(r"--only: expected a contender's name, or a part of it, got '(\w+)' \(valid: (.+)\)", told)
+    assert [word for word, _ in listed] == ["nobody", "nemo"]
+    names = listed[0][1].split(", ")
+    assert len(names) == len(set(names)) > 5
+    for name in names:  # each may be given as it stands there
+        assert any(name in contender.name for contender in bench._chosen(name, CONTENDERS))
     assert list(contents(elsewhere)) == ["short.toml"]
 
 

@@ -17,7 +17,8 @@ from typing import Any
 
 import pytest
 
-from springline.runner import storage
+from springline.codegen.kernel_source import runtime_sources
+from springline.runner import storage, work
 from springline.runner.batch import open_pool, run_sweep, versions
 from springline.runner.commands.batch import batch
 from springline.runner.dataset import Dataset, changes, place, read_dataset
@@ -118,6 +119,25 @@ def test_resume_refuses_another_kernel_but_not_another_version(write: Callable[.
     file.write_text(json.dumps(stored), encoding="utf-8")
     with pytest.raises(InputError, match=r'groups\.0\.kernel: "000'):
         run(write(), folder, resume=True)
+
+
+def test_the_kernels_hash_is_of_what_the_compiler_sees(
+    write: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A dataset resumes after a comment in the C was edited, and not after anything else was."""
+    own, sources = Plan(load_sweep(write())).groups[0].work, runtime_sources()
+
+    def identity(**edited: str) -> str:
+        monkeypatch.setattr(work, "runtime_sources", lambda: sources | edited)
+        monkeypatch.setattr(work, "_runtime_tokens", runtime_tokens)
+        return str(work._emitted.__wrapped__(own.structure, own.sampled, own.tunable, own.baked)[0])
+
+    runtime_tokens = work._runtime_tokens.__wrapped__
+    loop = sources["loop.c"]
+    assert identity() == own.identity
+    assert identity(**{"loop.c": f"/* another word */\n{loop.replace('  ', '   ')}"}) == own.identity
+    assert identity(**{"loop.c": f"{loop}int another;\n"}) != own.identity
+    assert identity(**{"sl_math.h": sources["sl_math.h"].replace("0.5", "0.25", 1)}) != own.identity
 
 
 def test_a_chosen_chunk_size_stays_when_resuming(write: Callable[..., Path], tmp_path: Path) -> None:

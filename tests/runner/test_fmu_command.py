@@ -81,7 +81,7 @@ def test_wrong_input(tmp_path: Path, folder: Path) -> None:
     assert "no C identifier" in refused(*export, *out, "--name", "two words")
     assert not (tmp_path / "out").exists()
     (tmp_path / "manifest.json").write_text('{"files": [], "functions": []}')
-    assert "holds something else than FMUs" in refused(*export, "--part", "plant", "-o", tmp_path)
+    assert "manifest.json: lists what another command wrote here" in refused(*export, "--part", "plant", "-o", tmp_path)
 
 
 def test_an_edited_fmu_is_never_lost(folder: Path, tmp_path: Path) -> None:

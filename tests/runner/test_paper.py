@@ -52,17 +52,21 @@ def pair(run: Measured, metric: str) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(
-    ("law", "response", "settling"),
+    ("law", "delta", "response", "settling"),
     [
-        ("variable_power_log", (0.19, 0.18), (0.215, 0.205)),
-        ("double_power", (0.22, 0.22), (0.255, 0.26)),
-        ("power", (1.04, 0.95), (1.18, 1.11)),
+        ("variable_power_log", 0.05, (0.19, 0.18), (0.215, 0.205)),
+        ("double_power", 0.05, (0.216, 0.216), (0.250, 0.250)),
+        ("double_power", 0.06, (0.22, 0.22), (0.255, 0.26)),
+        ("power", 0.05, (1.03, 0.94), (1.16, 1.08)),
+        ("power", 0.06, (1.04, 0.95), (1.18, 1.11)),
     ],
 )
-def test_times_of_the_three_laws(law: str, response: tuple[float, float], settling: tuple[float, float]) -> None:
-    run = seen(control__law=law)
-    assert pair(run, "response_time") == pytest.approx(response, rel=0.03)
-    assert pair(run, "settling_time") == pytest.approx(settling, rel=0.05)
+def test_times_of_the_three_laws(
+    law: str, delta: float, response: tuple[float, float], settling: tuple[float, float]
+) -> None:
+    run = seen(control__law=law, control__delta=delta)
+    assert pair(run, "response_time") == pytest.approx(response, abs=0.005)
+    assert pair(run, "settling_time") == pytest.approx(settling, abs=0.005)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pickle
 import time
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -398,6 +399,8 @@ def test_unknown_scenarios_are_told(tmp_path: Path) -> None:
         load_scenario(tmp_path / "arn.toml")
     with pytest.raises(InputError, match="is a folder: expected a TOML file"):
         load_scenario(tmp_path)
+    with pytest.raises(InputError, match=r"a{9}.*: cannot be read"):
+        load_scenario("a" * 5000)
     (tmp_path / "latin.toml").write_bytes(b"# \xe4\n")
     with pytest.raises(InputError, match="UTF-8"):
         load_scenario(tmp_path / "latin.toml")
@@ -457,25 +460,41 @@ def test_a_scenario_is_not_changed_by_its_overrides() -> None:
         ("reference.lift.terms.1.omega", 1, ["there is no such entry", "(0 to 0)"]),
         ("control.k1", None, ["control.k1", "got None"]),
         ("", 1, ["unknown table"]),
+        # what is told of here is a key of the file that the override no longer suits
+        ("control.m", 5, ["control.l", "expected l > m"]),
+        ("simulation.step", 3e-4, ["simulation.duration", "whole multiple"]),
+        ("control.mode", "sampled", ["control.period", "is missing"]),
     ],
 )
 def test_mistakes_in_overrides_are_told(key: str, value: object, expected: list[str], told) -> None:
     message = told("", {key: value})
-    assert message.startswith("override of ") and "s.toml" in message
+    assert message.startswith("override of ") and "s.toml" in message.partition(": ")[0]
     assert all(part in message for part in expected), message
 
 
 def test_set_is_a_key_and_a_toml_value() -> None:
-    assert parse_set("control.delta=0.02") == ("control.delta", 0.02)
-    assert parse_set(' control.law = "power"') == ("control.law", "power")
-    assert parse_set("plant.m3={ scale = 1.2 }") == ("plant.m3", {"scale": 1.2})
-    assert parse_set("control.U_max=[inf, 3]") == ("control.U_max", [math.inf, 3])
+    assert parse_set("control.delta=0.02", "s") == ("control.delta", 0.02)
+    assert parse_set(' control.law = "power"', "s") == ("control.law", "power")
+    assert parse_set("plant.m3={ scale = 1.2 }", "s") == ("plant.m3", {"scale": 1.2})
+    assert parse_set("control.U_max=[inf, 3]", "s") == ("control.U_max", [math.inf, 3])
 
 
 @pytest.mark.parametrize("text", ["control.delta", "=3", "control.law=power", "a=1\nb=2", "a="])
 def test_what_is_no_set_is_told(text: str) -> None:
-    with pytest.raises(InputError, match="--set"):
-        parse_set(text)
+    with pytest.raises(InputError, match=r"^override of paper/nominal: .*expected"):
+        parse_set(text, "paper/nominal")
+
+
+@pytest.mark.parametrize("overrides", ["control.delta=1", 5, [], [("control.delta", 1.0)], {1: 2.0}])
+def test_overrides_of_another_kind_are_told(overrides: Any) -> None:
+    with pytest.raises(TypeError, match=r"expected overrides such as \{'control\.delta': 0\.02\}, got"):
+        load_scenario("paper/nominal", overrides)
+
+
+@pytest.mark.parametrize("source", [None, 5, b"paper/nominal", load_scenario("paper/nominal")])
+def test_a_source_of_another_kind_is_told(source: Any) -> None:
+    with pytest.raises(TypeError, match="expected the path or name of a scenario, got"):
+        load_scenario(source)
 
 
 # Numbers that vary

@@ -295,7 +295,7 @@ def test_the_packaged_sweeps_are_those_of_the_documentation() -> None:
         ("control.k1 = { uniform = [1, 2] }", "samples = 9\nmethod = 'sobel'", "unknown method.*'sobol'"),
         ("control.k1 = { uniform = [1, 2] }", "samples = 9\nseed = -1", "seed: expected"),
         ("control.k1 = { uniform = [1, 2] }", "samples = 9\nsample = 3", "sample: unknown key.*'samples'"),
-        ("control.k1 = { uniform = [1, 2] }", "samples = 9\n[set]\ncontrol.k9 = 3", r"control\.k9.*k1"),
+        ("control.k1 = { uniform = [1, 2] }", "samples = 9\n[set]\ncontrol.k9 = 3", r"set: override of .*\.k9.*k1"),
         ("control.k1 = { uniform = [1, 2] }", "method = 'grid'", "number of points"),
         ("control.k1 = { normal = [1, 2] }", "method = 'grid'", "no normal axis"),
         ("control.k1 = { values = [1, 2] }", "method = 'grid'\nsamples = 9", "a grid takes none"),
