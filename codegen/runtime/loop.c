@@ -299,7 +299,7 @@ static void end_runs(sl_pack *pack, int64_t k) {
   }
 }
 
-/* Packs side by side, stage by stage: none waits for its own last stage, for another's lies between. */
+/* Packs side by side, stage by stage: while one waits for the results of its last stage, another has work to do. */
 static void run_packs(sl_pack *packs, int count, const sl_job *job) {
   const double bound = sl_fmin(job->bound, DBL_MAX);
   int64_t k, reported = 0, runs = 0;
