@@ -148,7 +148,7 @@ def best_flags(compiler: toolchain.Compiler) -> tuple[str, ...]:
 
 def _flags(options: KernelOptions) -> tuple[str, ...]:
     wanted = best_flags(options.compiler or toolchain.find_compiler()) if options.flags is None else options.flags
-    return (*wanted, "-std=gnu99", "-fvisibility=hidden", "-Wno-unused-parameter", "-Wno-psabi")
+    return (*wanted, "-std=gnu99", "-fvisibility=hidden", "-Wno-unused-parameter", "-Wno-psabi", "-lm")
 
 
 @lru_cache(maxsize=1)

@@ -10,6 +10,7 @@
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  * Times are t = start + (j / 2) h for half steps j, never accumulated.
  */
+#include <fenv.h>
 #include <float.h>
 #include <stddef.h>
 #include <string.h>
@@ -351,7 +352,10 @@ __attribute__((visibility("default"))) void springline_layout(int64_t *layout) {
 __attribute__((visibility("default"))) void springline_simulate(const sl_job *job) {
   sl_pack packs[SL_PACKS];
   sl_clock clock;
+  fenv_t environment; /* whoever else is in this process may have set another rounding, or denormal numbers to zero */
   int64_t first = job->first;
+  fegetenv(&environment);
+  fesetenv(FE_DFL_ENV);
   clock.job = job;
   while (first < job->last) {
     int count;
@@ -361,4 +365,5 @@ __attribute__((visibility("default"))) void springline_simulate(const sl_job *jo
     }
     run_packs(packs, count, job);
   }
+  fesetenv(&environment);
 }

@@ -54,7 +54,8 @@ def test_aarch64_gives_the_same_bits(
         (tmp_path / name).write_text(text)
     (tmp_path / "driver.c").write_text(DRIVER % (len(table), settings.steps, settings.step))
     flags = [flag for flag in source.flags if not flag.startswith("-Wno-psabi")]
-    command = [compiler, *flags, "-ffp-contract=off", "-fno-math-errno", "-static", "-w", "driver.c", "-o", "driver"]
+    options = [*flags, "-ffp-contract=off", "-fno-math-errno", "-static", "-w"]
+    command = [compiler, *options, "driver.c", "-o", "driver", "-lm"]  # libraries come after what needs them
     subprocess.run(command, cwd=tmp_path, check=True)
     output = subprocess.run([emulator, "driver"], cwd=tmp_path, input=table.tobytes(), capture_output=True, check=True)
     assert output.stdout == expected.final_state.tobytes() + expected.metrics.tobytes()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from springline.codegen import toolchain
 from springline.codegen.kernel import METRICS, Control, KernelOptions, LoopSettings, Runs, Table, compile_kernel
 from springline.codegen.program import Program, program
 from springline.model.linear import as_written
@@ -232,6 +233,41 @@ def test_threads_share_nothing(shaken: Program, values_of: Values) -> None:
         thread.join()
     assert all(r.final_state.tobytes() == expected.final_state.tobytes() for r in results.values())
     assert len(results) == 4
+
+
+ENVIRONMENT = """
+#include <fenv.h>
+#ifdef __SSE2__
+#include <xmmintrin.h>
+#endif
+/* Rounds upward and flushes denormal numbers to zero, as a library of -ffast-math may have the process do. */
+void disturb(void) {
+  fesetround(FE_UPWARD);
+#ifdef __SSE2__
+  _mm_setcsr(_mm_getcsr() | 0x8040);
+#endif
+}
+int disturbed(void) { return fegetround() == FE_UPWARD; }
+void restore(void) { fesetenv(FE_DFL_ENV); }
+"""
+
+
+def test_rounding_and_flushing_of_the_process_do_not_matter(shaken: Program, values_of: Values) -> None:
+    library = toolchain.load(
+        toolchain.build_library({"environment.c": ENVIRONMENT}, main="environment.c", flags=("-std=c99", "-lm"))
+    )
+    kernel = compile_kernel(shaken, False, PLAIN)
+    values = np.stack([values_of(shaken), values_of(shaken, {"initial.dq.0": 5e-324})])
+    settings = LoopSettings(20, 1e-3)
+    expected = kernel.run(values, settings)
+    library.disturb()
+    try:
+        result = kernel.run(values, settings)
+        assert library.disturbed(), "it is the caller's, and stays"
+    finally:
+        library.restore()
+    assert result.final_state.tobytes() == expected.final_state.tobytes()
+    assert result.metrics.tobytes() == expected.metrics.tobytes()
 
 
 @pytest.mark.parametrize("packs", [1, 3])
