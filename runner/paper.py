@@ -46,11 +46,14 @@ class Reproduction:
         return self.folder / REPORT
 
 
-def reproduce(folder: Path, groups: Sequence[int] | None = None, *, progress: Progress | None = None) -> Reproduction:
+def reproduce(
+    folder: Path, groups: Sequence[int] | None = None, *, force: bool = False, progress: Progress | None = None
+) -> Reproduction:
     """Repeat the paper and write report.html, report.md, numbers.json and figures/ to `folder`.
 
     groups    groups of Table 2, None for the whole paper. Some groups alone give their rows of Table 4, their figures
               and the claims that they can test
+    force     replace files of an earlier reproduction that were edited since
     progress  called now and then with the share that is done (0 .. 1)
     The same springline gives the same bytes. An earlier reproduction in `folder` is replaced; anything else is not.
     Raises FolderConflict if something else is in the way (nothing is written then), ValueError for a group that
@@ -75,7 +78,7 @@ def reproduce(folder: Path, groups: Sequence[int] | None = None, *, progress: Pr
     files["report.md"] = to_markdown(document).encode()
     files[REPORT] = to_html(document).encode()
     files["numbers.json"] = canonical_json({"table_4": table, "claims": [_plain_finding(f) for f in findings]})
-    changes = write_tree(folder, files, {"kind": _KIND, "groups": list(done.groups), "whole": whole})
+    changes = write_tree(folder, files, {"kind": _KIND, "groups": list(done.groups), "whole": whole}, force=force)
     return Reproduction(folder, tuple(findings), tuple(table), changes)
 
 

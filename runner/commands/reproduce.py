@@ -20,6 +20,7 @@ def reproduce(
         list[int] | None,
         typer.Option("--group", metavar="N", help="A group of Table 2 alone. May be given again.", show_default="all"),
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that were edited since.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print Table 4 as JSON.")] = False,
 ) -> None:
     """Repeat the reference paper: its runs, tables, figures and claims, in one report.
@@ -35,7 +36,7 @@ def reproduce(
         raise InputError(*(unknown("springline reproduce", "--group", "group", item, known) for item in wrong))
     refuse_files(output)
     with progress("reproducing the paper", quiet=as_json) as report:
-        done = repeat(output, group, progress=report)
+        done = repeat(output, group, force=force, progress=report)
     if as_json:
         print_json("reproduce", done.table, {})
         return

@@ -460,8 +460,10 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     seen: list[object] = []
     row = {"group": 2, "case": "power", "joint": "lift", "measure": "settling_time", "unit": "s"}
 
-    def reproduce(folder: Path, groups: list[int] | None = None, *, progress: object = None) -> paper.Reproduction:
-        seen.extend([folder, groups])
+    def reproduce(
+        folder: Path, groups: list[int] | None = None, *, force: bool = False, progress: object = None
+    ) -> paper.Reproduction:
+        seen.extend([folder, groups, force])
         finding = Finding(3, "the new law is the fastest", (Check("yes", True),), ())
         return paper.Reproduction(folder, (finding,), ({**row, "printed": 0.76, "value": None, "change": None},), None)
 
@@ -474,14 +476,14 @@ def test_reproduce_shows_the_paper_beside_ours_and_verdicts(asked: list[object])
     assert re.search(r"2 power +lift +settling time +0\.76 s +–", shown)
     assert re.search(r"3 +the new law is the fastest +holds", shown)
     assert "report: report/report.html" in shown
-    assert asked == [Path("report"), [2, 4]]
+    assert asked == [Path("report"), [2, 4], False]
 
 
 def test_reproduce_prints_json(asked: list[object]) -> None:
-    answer = json.loads(done("reproduce", "--json"))
+    answer = json.loads(done("reproduce", "--json", "--force"))
     assert (answer["command"], answer["status"]) == ("reproduce", "ok")
     assert answer["rows"][0]["value"] is None
-    assert asked == [Path("reproduction"), None]
+    assert asked == [Path("reproduction"), None, True]
 
 
 def test_reproduce_refuses_wrong_input(elsewhere: Path) -> None:

@@ -9,6 +9,7 @@ import base64
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -272,6 +273,17 @@ def test_another_process_replaces_it_with_the_same_bytes(done: Reproduction, tmp
     environment = os.environ | {"PYTHONHASHSEED": "7", "TZ": "Asia/Tokyo"}
     subprocess.run([sys.executable, "-c", program, tmp_path], check=True, env=environment)
     assert contents(tmp_path) == before | {"notes.txt": b"mine"}
+
+
+def test_an_edited_report_is_replaced_only_when_asked(done: Reproduction, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(done.folder, folder)
+    (folder / "report.md").write_text("my notes")
+    with pytest.raises(FolderConflict, match=r"report.md: edited(.|\n)*--force"):
+        reproduce(folder, [4])
+    assert (folder / "report.md").read_text() == "my notes"
+    reproduce(folder, [4], force=True)
+    assert contents(folder) == contents(done.folder)
 
 
 def test_a_folder_of_another_command_is_left_alone(tmp_path: Path) -> None:
