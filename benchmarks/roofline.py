@@ -49,9 +49,10 @@ def build() -> Callable[[], float]:
 
 
 def flops_per_evaluation(kernel: Kernel) -> float:
-    """Floating-point operations of one evaluation of one run; NaN where the machine code cannot be read.
+    """Floating-point operations of one evaluation of one run, in a kernel of one pack (continuous control has one).
 
-    That is: no objdump, no x86-64, or a compiler that leaves no function of its own for the evaluation.
+    NaN where the machine code cannot be read: no objdump, no x86-64, or a compiler that leaves no function of its own
+    for the evaluation.
     """
     objdump = shutil.which("objdump")
     if objdump is None:

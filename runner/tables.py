@@ -94,7 +94,7 @@ class Table:
 def spline(t0: float, dt: float, samples: Floats, ends: Ends) -> Table:
     """The Table through `samples` (rows, channels), at least four rows; a periodic one repeats its first row last."""
     # Here, because it takes longer to import than everything that a scenario without tables needs.
-    from scipy.interpolate import CubicSpline  # noqa: PLC0415
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - slow to load, and only tables need it
 
     times = dt * np.arange(samples.shape[0])
     fit = CubicSpline(times, samples, bc_type=_BOUNDARY[ends])

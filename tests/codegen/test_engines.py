@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import get_args
 
 import casadi as ca
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from springline.codegen import lanes, toolchain
-from springline.codegen.kernel import KernelOptions, LoopSettings, Runs, compile_kernel
+from springline.codegen.kernel import Engine, KernelOptions, LoopSettings, Runs, compile_kernel
 from springline.codegen.operations import UnprintableOperation
 from springline.codegen.program import Program
 from springline.model.linear import as_written
@@ -99,8 +100,8 @@ def test_clang_equals_gcc(
     clang = toolchain.probe_compiler([require_tool("clang", "apt-get install clang")])
     assert clang is not None
     sampled, expected = reference
-    for engine in ("casadi", "lanes"):
-        options = KernelOptions(engine=engine, flags=flags, compiler=clang)  # type: ignore[arg-type]  # Literal
+    for engine in get_args(Engine):
+        options = KernelOptions(engine=engine, flags=flags, compiler=clang)
         assert_same(run(shaken, table, options, sampled=sampled, settings=replace(SHORT, hold=5)), expected)
 
 

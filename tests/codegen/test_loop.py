@@ -283,6 +283,9 @@ def test_runs_can_be_watched_and_stopped(packs: int, shaken: Program, values_of:
     for end, rows, trajectory in zip(result.end_time, result.rows, result.trajectory, strict=True):
         assert 0.0 < end < 0.1
         assert trajectory[rows - 1, 0] == end, "the last row is where the run was stopped"
+    short = kernel.run(runs, LoopSettings(round(result.end_time[0] / 1e-5), 1e-5))
+    assert result.end_time.tobytes() == short.end_time.tobytes()
+    assert result.final_state.tobytes() == short.final_state.tobytes(), "the state is that of the time"
     control = Control()
     kernel.run(runs, LoopSettings(10_000, 1e-5), control=control)
     assert control.progress.value == 2 * packs * 10_000

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from importlib import import_module
 from multiprocessing.context import ForkServerContext
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any
 
 import pytest
 
+from springline.codegen import lanes
 from springline.codegen.kernel_source import runtime_sources
 from springline.runner import storage, work
 from springline.runner.batch import open_pool, run_sweep, versions
@@ -138,6 +140,15 @@ def test_the_kernels_hash_is_of_what_the_compiler_sees(
     assert identity(**{"loop.c": f"/* another word */\n{loop.replace('  ', '   ')}"}) == own.identity
     assert identity(**{"loop.c": f"{loop}int another;\n"}) != own.identity
     assert identity(**{"sl_math.h": sources["sl_math.h"].replace("0.5", "0.25", 1)}) != own.identity
+    emit = lanes.emit
+    for text, same in (("/* another word */", True), ("int another;", False)):  # in the printed kernel
+
+        def edited(*given: Any, text: str = text) -> lanes.Emission:
+            emission = emit(*given)
+            return replace(emission, text=f"{emission.text}\n{text}\n")
+
+        monkeypatch.setattr(lanes, "emit", edited)
+        assert (identity() == own.identity) is same
 
 
 def test_a_chosen_chunk_size_stays_when_resuming(write: Callable[..., Path], tmp_path: Path) -> None:
