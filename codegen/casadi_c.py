@@ -67,8 +67,8 @@ static inline void kernel_run(const sl_group *p, sl_group *r) {{
 {call("run", p, results=["(double *)r"])}
 }}
 
-static inline void kernel_start(const sl_group *p, const sl_group *r, sl_group *x) {{
-{call("start", p, r, results=["(double *)x"])}
+static inline void kernel_start(double t, const double *d, const sl_group *p, const sl_group *r, sl_group *x) {{
+{call("start", "&t", "d", p, r, results=["(double *)x"])}
 }}
 
 static inline void kernel_uniform(const double *t, const double *d, sl_v *uniform) {{}}

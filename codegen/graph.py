@@ -173,7 +173,9 @@ class LoopGraph(ValueGraph):
         u = [self.leaf("u", i, Binding.STATE) for i in range(program.size("u"))]
         functions = program.functions
         [r] = self.add("run", functions["run"], [p])
-        self.add("start", functions["start"], [p, r])
+        beginning = [self.leaf("begin", 0, Binding.STATE)]
+        first = [self.leaf("first", i, Binding.STATE) for i in range(program.size("d"))]
+        self.add("start", functions["start"], [beginning, first, p, r])
         [w] = self.add("signals", functions["signals"], [t, d, p, r])
         [s] = self.add("time", functions["time"], [w, p, r])
         self.add("error", functions["error"], [w, s, x, p, r])

@@ -21,6 +21,7 @@ from springline.codegen.graph import Binding, LoopGraph
 from springline.codegen.operations import MASKS, POWERS, SPECIAL_POWERS, formula, print_operation
 from springline.codegen.program import Program
 from springline.model.base import COORDINATES
+from springline.model.quantities import entries
 
 # Rough latencies in cycles: they only decide the order of statements.
 _LATENCY = {
@@ -117,6 +118,7 @@ class _Emitter:
         system, outputs = self.program.system, self.graph.outputs
         names: dict[int, str] = {}
         joints = [joint.name for joint in system.joints]
+        states = [entry.name for entry in entries(system.drive.state, system.joints)]
 
         def name(nodes: Sequence[int], labels: Sequence[str]) -> None:
             for i, label in zip(nodes, labels, strict=True):
@@ -128,7 +130,7 @@ class _Emitter:
         for i, node in enumerate(self.graph.nodes):
             kind, k = node.source
             if node.op is None and kind == "x":
-                names[i] = f"{('q1', 'dq1', 'q2', 'dq2')[k // system.n]}_{joints[k % system.n]}"
+                names[i] = states[k]
             elif node.op is None and kind == "u":
                 names[i] = f"u_{joints[k]}"
             elif node.op is None and kind == "p":
@@ -137,6 +139,8 @@ class _Emitter:
                 names[i] = "t"
             elif node.op is None and kind == "d":
                 names[i] = f"d{k}"
+            elif node.op is None and kind in ("begin", "first"):
+                names[i] = f"{kind}{k}"
         signal = [f"{q}_{j}" for q in ("q1d", "dq1d", "ddq1d") for j in joints]
         name(outputs["signals"][0], signal + [f"{d}{c}" for d in ("", "d_", "dd_") for c in base])
         for part, label in zip(outputs["control"], ("command", "e", "sigma"), strict=True):
@@ -329,6 +333,8 @@ class _Emitter:
         name, k = node.source
         if name in ("p", "x", "u"):
             return f"{name}[{k}][{group}]"
+        if name in ("begin", "first"):
+            return "slv_set(time)" if name == "begin" else f"slv_set(data[{k}])"
         if node.binding is Binding.RUN:
             return f"r[{self.slots[Binding.RUN][i]}][{group}]"
         if node.binding is Binding.UNIFORM:
@@ -379,7 +385,7 @@ class _Emitter:
 
     def text(self) -> str:
         """All functions of the kernel."""
-        n, outputs = self.program.system.n, self.graph.outputs
+        n, states, outputs = self.program.system.n, self.program.size("x"), self.graph.outputs
         run, uniform, varying = (list(self.slots[b]) for b in (Binding.RUN, Binding.UNIFORM, Binding.VARYING))
         given = "const sl_group *p, const sl_group *r"
         now = "sl_time now, const sl_group *x"
@@ -433,7 +439,13 @@ class _Emitter:
                     ["g"],
                 ),
                 self._function(
-                    "start", f"{given}, sl_group *x", outputs["start"][0], Binding.STATE, into("x"), self._given, ["g"]
+                    "start",
+                    f"double time, const double *data, {given}, sl_group *x",
+                    outputs["start"][0],
+                    Binding.STATE,
+                    into("x"),
+                    self._given,
+                    ["g"],
                 ),
                 "/* ---- once per time: for all runs, then for each ---- */\n",
                 self._function(
@@ -464,10 +476,10 @@ class _Emitter:
                     ["g"],
                 ),
                 "/* ---- at every evaluation ---- */\n",
-                state("closed", now, {"dx": 4 * n, **control}),
+                state("closed", now, {"dx": states, **control}),
                 state("control", now, control),
                 state("error", now, {"e": n, "sigma": n}),
-                state("plant", f"{now}, const sl_group *u", {"dx": 4 * n}),
+                state("plant", f"{now}, const sl_group *u", {"dx": states}),
             ]
         )
 

@@ -1,7 +1,7 @@
 """The Program of a system: its loop as frozen CasADi Functions, one per binding time.
 
     run(p) -> r                       once per run
-    start(p, r) -> x                  the initial state
+    start(t, d, p, r) -> x            the initial state, t being the beginning
     signals(t, d, p, r) -> w          once per time: reference and base motion
     time(w, p, r) -> s                once per time: what else depends on time only
     error(w, s, x, p, r) -> e, sigma
@@ -67,7 +67,7 @@ def program(structure: Structure) -> Program:
     sources = {"signals": system.function("signals"), "start": system.function("start"), **loop}
     inputs = {
         "signals": [t, d, p],
-        "start": [p],
+        "start": [t, d, p],
         "error": [w, x, p],
         "control": [w, x, p],
         "plant": [w, x, u, p],
@@ -93,7 +93,7 @@ def program(structure: Structure) -> Program:
         r, s = run.symbols, time.symbols
         signature = {
             "run": ([p], [run.values], ["p"], ["r"]),
-            "start": ([p, r], staged["start"], ["p", "r"], ["x"]),
+            "start": ([t, d, p, r], staged["start"], ["t", "d", "p", "r"], ["x"]),
             "signals": ([t, d, p, r], staged["signals"], ["t", "d", "p", "r"], ["w"]),
             "time": ([w, p, r], [time.values], ["w", "p", "r"], ["s"]),
             "error": ([w, s, x, p, r], staged["error"], ["w", "s", "x", "p", "r"], ["e", "sigma"]),

@@ -11,66 +11,13 @@ the base. Any number of joints, any base motion.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import casadi as ca
 
 from springline.model.base import BaseMotion
+from springline.model.mechanism import Mechanism
 from springline.model.normal_form import collect
-from springline.model.parameters import Joint, Parameter, Values
-from springline.model.signals import SineTerm
-
-
-class Mechanism(Protocol):
-    """What a mechanism has to tell: its joints, its parameters, and two energies.
-
-    `parameters` must contain "g". `motor_inertia` and `stiffness` declare the series elastic drive, one per joint.
-    `reference_*` and `start_*` are a scenario's defaults, one per joint.
-    kinetic_energy(q, dq, omega, p): J; velocities are jtimes(r, q, dq) + cross(omega, r), base axes
-    potential_energy(q, gravity, p): J; `gravity` is a 3 x 1 vector that points up, m/s^2, base axes
-    """
-
-    @property
-    def name(self) -> str:
-        """Name in scenario files."""
-
-    @property
-    def joints(self) -> tuple[Joint, ...]:
-        """The joints, in the order of q."""
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters of the two energies."""
-
-    @property
-    def motor_inertia(self) -> tuple[Parameter, ...]:
-        """Diagonal of M2, one per joint."""
-
-    @property
-    def stiffness(self) -> tuple[Parameter, ...]:
-        """Diagonal of K, one per joint."""
-
-    @property
-    def reference_offset(self) -> tuple[float, ...]:
-        """Constant part of the desired trajectory."""
-
-    @property
-    def reference_terms(self) -> tuple[tuple[SineTerm, ...], ...]:
-        """Sine terms of the desired trajectory."""
-
-    @property
-    def start_position(self) -> tuple[float, ...]:
-        """Initial joint coordinates."""
-
-    @property
-    def start_rate(self) -> tuple[float, ...]:
-        """Initial joint rates."""
-
-    def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX:
-        """T, J, seen from a frame that moves with the base origin."""
-
-    def potential_energy(self, q: ca.SX, gravity: ca.SX, p: Values) -> ca.SX:
-        """V, J."""
+from springline.model.parameters import Values
 
 
 @dataclass(frozen=True, slots=True)

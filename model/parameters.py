@@ -7,7 +7,7 @@ symbolic column vector p that every Function takes last; each scalar entry of p 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -67,11 +67,13 @@ class Joint:
 class Parameter:
     """A named number of the model.
 
-    name     key in its TOML table and in the code
-    unit     SI unit; "{q}" and "{F}" stand for the joint's coordinate and force unit
-    default  a number, or one per joint (then the parameter has an entry per joint)
-    meaning  one sentence without a full stop
-    bounds   what values are admissible
+    name       key in its TOML table and in the code
+    unit       SI unit; "{q}" and "{F}" stand for the joint's coordinate and force unit
+    default    a number; where there is an entry per joint, also one for each
+    meaning    one sentence without a full stop
+    bounds     what values are admissible
+    per_joint  whether there is an entry per joint
+    Raises ValueError for several defaults of a parameter that has one entry.
     """
 
     name: str
@@ -79,11 +81,25 @@ class Parameter:
     default: float | tuple[float, ...]
     meaning: str
     bounds: Bounds = REAL
+    per_joint: bool = False
 
-    @property
-    def per_joint(self) -> bool:
-        """Whether there is an entry per joint."""
-        return isinstance(self.default, tuple)
+    def __post_init__(self) -> None:
+        if isinstance(self.default, tuple) and not self.per_joint:
+            raise ValueError(f"parameter {self.name} has {len(self.default)} defaults: say per_joint=True")
+
+    def defaults(self, joints: Sequence[Joint]) -> tuple[float, ...]:
+        """One default per entry: a number stands for every joint.
+
+        Raises ValueError if there are as many as neither one nor the joints.
+        """
+        if not isinstance(self.default, tuple):
+            return (self.default,) * (len(joints) if self.per_joint else 1)
+        if len(self.default) != len(joints):
+            names = ", ".join(joint.name for joint in joints)
+            raise ValueError(
+                f"parameter {self.name} has {len(self.default)} defaults, expected one per joint ({names})"
+            )
+        return self.default
 
     def unit_of(self, joint: Joint) -> str:
         """Unit of a joint's entry."""
@@ -153,7 +169,8 @@ class ParameterVector:
         symbols: dict[str, ca.SX] = {}
         for item in parameters:
             stem = f"{table}_{item.name}"
-            if isinstance(item.default, tuple):
+            defaults = item.defaults(joints)
+            if item.per_joint:
                 entries = [
                     self.scalar(
                         f"{table}.{item.name}.{i}",
@@ -163,12 +180,12 @@ class ParameterVector:
                         f"{item.meaning} ({joint.name})",
                         item.bounds,
                     )
-                    for i, (joint, default) in enumerate(zip(joints, item.default, strict=True))
+                    for i, (joint, default) in enumerate(zip(joints, defaults, strict=True))
                 ]
                 symbols[item.name] = ca.vertcat(*entries)
             else:
                 unit = " or ".join(dict.fromkeys(item.unit_of(joint) for joint in joints))
                 symbols[item.name] = self.scalar(
-                    f"{table}.{item.name}", stem, unit, item.default, item.meaning, item.bounds
+                    f"{table}.{item.name}", stem, unit, defaults[0], item.meaning, item.bounds
                 )
         return Values(symbols)

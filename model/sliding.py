@@ -32,11 +32,11 @@ TINY = 1e-120
 LARGEST_EXPONENT = 700.0
 
 SURFACE_PARAMETERS = (
-    Parameter("mu", "1/s", (12.0, 5.0), "surface gain of the odd power e^(l/m)", POSITIVE),
+    Parameter("mu", "1/s", 5.0, "surface gain of the odd power e^(l/m)", POSITIVE, per_joint=True),
     Parameter("lambda", "1/s", 5.0, "surface gain of the terminal term e^(p/r)", POSITIVE),
     Parameter("delta", "{q}", 0.05, "boundary layer of the terminal term (0: the literal law)", NON_NEGATIVE),
 )
-A_MAX = Parameter("a_max", "{q}/s^2", (200.0, 200.0), "limit on the reaching law's acceleration", LIMIT)
+A_MAX = Parameter("a_max", "{q}/s^2", 200.0, "limit on the reaching law's acceleration", LIMIT, per_joint=True)
 
 K1 = Parameter("k1", "SI", 3.0, "gain of the reaching law's first term", POSITIVE)
 K2 = Parameter("k2", "SI", 5.0, "gain of the reaching law's second term", POSITIVE)

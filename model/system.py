@@ -1,6 +1,7 @@
 """The whole system: mechanism, drive, signals and controller put together, as named CasADi Functions.
 
-    State x = [q1, dq1, q2, dq2] (4n x 1). Argument order everywhere: what depends on time, x, u, p.
+    State x = [q1, dq1, q2, dq2] (4n x 1; without q2, dq2 where the drive is rigid). Argument order everywhere: what
+    depends on time, x, u, p.
 
 Plant and controller have parameters of their own: "plant.*" is the arm that moves, "mechanism.*" and "drive.*" are what
 the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db, ddb] alone.
@@ -16,24 +17,27 @@ import casadi as ca
 
 from springline.model import perturbation, signals
 from springline.model.base import COORDINATES, BaseMotion
-from springline.model.control import K_F, U_MAX, control, fast_control
-from springline.model.drive import EPSILON, plant, static_motor_position
-from springline.model.lagrange import Mechanism, equations_of_motion
+from springline.model.control import K_F, U_MAX, ControlSignals, control, fast_control
+from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
+from springline.model.lagrange import EquationsOfMotion, equations_of_motion
 from springline.model.linear import as_written
+from springline.model.mechanism import Mechanism
 from springline.model.mechanisms import MECHANISMS
-from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
+from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot
+from springline.model.quantities import BASE, DQ1, DQ2, Q1, REFERENCE, U_S, Quantity
 from springline.model.signals import CONSTANT_ZERO, Signal
 from springline.model.sliding import A_MAX, LAWS, SURFACE_PARAMETERS, LogForm, SurfaceExponents
 
-SignalKind = Literal["none", "sine", "table"]
+SignalKind = Literal["none", "sine", "polynomial", "table"]
 MotorStart = Literal["unloaded", "equilibrium", "given"]
+JointStart = Literal["given", "reference"]
 
 
 @dataclass(frozen=True, slots=True)
 class SignalShape:
-    """The shape of a vector signal: its kind, and per coordinate the number of sine terms or if it has a column.
+    """The shape of a vector signal: its kind, and what it has per coordinate.
 
-    sine: terms[i] is the number of terms of coordinate i. table: terms[i] is 1 with a column, 0 (zero) without.
+    terms  sine: number of terms; polynomial: number of via points; table: 1 with a column, 0 (zero) without
     """
 
     kind: SignalKind = "none"
@@ -42,7 +46,12 @@ class SignalShape:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """Everything about a system that is no number: a new structure is a new kernel, a new number is not."""
+    """Everything about a system that is no number: a new structure is a new kernel, a new number is not.
+
+    start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
+    initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
+                   told; on the reference they start with springs that carry the arm along it
+    """
 
     mechanism: str = "transfer_manipulator"
     law: str = "variable_power_log"
@@ -51,6 +60,8 @@ class Structure:
     reference: SignalShape = SignalShape("sine", (1, 1))
     base_motion: SignalShape = SignalShape("none", (0, 0, 0))
     initial_motor: MotorStart = "unloaded"
+    drive: DriveKind = "elastic"
+    start: JointStart = "given"
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,12 +76,16 @@ class TableLayout:
     channels: tuple[int, ...]
 
 
-def control_parameters() -> tuple[Parameter, ...]:
-    """Every numeric parameter of the [control] table: the union over all laws, so that p does not depend on the law."""
+def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tuple[Parameter, ...]:
+    """Every numeric parameter of the [control] table, with the mechanism's defaults.
+
+    It is the union over all laws, so that p does not depend on the law; a rigid drive has no fast control.
+    """
     seen: dict[str, Parameter] = {}
     for law in LAWS.values():
         seen |= {item.name: item for item in law.parameters}
-    return (*seen.values(), *SURFACE_PARAMETERS, K_F, A_MAX, U_MAX)
+    fast = (K_F,) if drive == "elastic" else ()
+    return tuple(mechanism.fitted(item) for item in (*seen.values(), *SURFACE_PARAMETERS, *fast, A_MAX, U_MAX))
 
 
 class System:
@@ -84,15 +99,18 @@ class System:
     def __init__(self, structure: Structure | None = None) -> None:
         self.structure = structure or Structure()
         self.mechanism: Mechanism = MECHANISMS[self.structure.mechanism]
+        self.drive: Drive = DRIVES[self.structure.drive]
         self.joints: tuple[Joint, ...] = self.mechanism.joints
         self.n = n = len(self.joints)
 
         vector = ParameterVector()
-        arm, drive = self.mechanism.parameters, (*self.mechanism.motor_inertia, *self.mechanism.stiffness)
+        arm, drive = self.mechanism.parameters, self.drive.parameters(self.mechanism)
+        split = (EPSILON,) if self.structure.drive == "elastic" else ()
         self._nominal = vector.table("mechanism", arm, self.joints)
-        self._nominal |= vector.table("drive", (*drive, EPSILON), self.joints)
+        self._nominal |= vector.table("drive", (*drive, *split), self.joints)
         self._plant = vector.table("plant", (*arm, *drive), self.joints)
-        self._control = vector.table("control", control_parameters(), self.joints)
+        control_table = control_parameters(self.mechanism, self.structure.drive)
+        self._control = vector.table("control", control_table, self.joints)
 
         self.t = ca.SX.sym("t")
         self._d: list[ca.SX] = []
@@ -102,7 +120,106 @@ class System:
         )
         base = self._signals("base_motion", self.structure.base_motion, [(c.key, c.unit) for c in COORDINATES], vector)
         self._signal_expressions = ca.vertcat(*signals.stack(reference), *signals.stack(base))
-        self._initial = {
+        self._initial = self._initial_values(vector)
+        self.d = ca.vertcat(*self._d)
+        self.p = vector.sx
+        self.slots: tuple[Slot, ...] = tuple(vector.slots)
+
+        self.q1d, self.dq1d, self.ddq1d = (ca.SX.sym(item.name, n) for item in REFERENCE)
+        self.base = BaseMotion(*(ca.SX.sym(f"{item.name}b", len(COORDINATES)) for item in BASE))
+        self.w = ca.vertcat(self.q1d, self.dq1d, self.ddq1d, self.base.b, self.base.db, self.base.ddb)
+        self._state: dict[Quantity, ca.SX] = {item: ca.SX.sym(item.name, n) for item in self.drive.state}
+        self.q1, self.dq1 = self._state[Q1], self._state[DQ1]
+        self.x = ca.vertcat(*self._state.values())
+        self.u = ca.SX.sym("u", n)
+
+    # Parameters of signals and start
+
+    def _signals(
+        self,
+        table: Literal["reference", "base_motion"],
+        shape: SignalShape,
+        coordinates: list[tuple[str, str]],
+        vector: ParameterVector,
+    ) -> list[Signal]:
+        """Expressions of one vector signal; appends its parameters to `vector` or its data to d."""
+        if shape.kind == "none":
+            return [CONSTANT_ZERO] * len(coordinates)
+        if shape.kind == "table":
+            return self._table(table, shape, [key for key, _ in coordinates])
+        one = self._via_points if shape.kind == "polynomial" else self._sines
+        return [
+            one(table, key, unit, count, vector) for (key, unit), count in zip(coordinates, shape.terms, strict=True)
+        ]
+
+    def _table(
+        self, table: Literal["reference", "base_motion"], shape: SignalShape, coordinates: list[str]
+    ) -> list[Signal]:
+        tau = ca.SX.sym(f"{table}_tau")
+        channels = tuple(i for i, count in enumerate(shape.terms) if count)
+        start = sum(symbol.numel() for symbol in self._d)
+        self.tables += (TableLayout(table, start, channels),)
+        blocks = {i: ca.SX.sym(f"{table}_{coordinates[i]}", 4) for i in channels}
+        self._d += [tau, *blocks.values()]
+        return [signals.cubic(tau, blocks[i]) if i in blocks else CONSTANT_ZERO for i in range(len(coordinates))]
+
+    def _via_points(self, table: str, key: str, unit: str, count: int, vector: ParameterVector) -> Signal:
+        def points(name: str, unit: str, meaning: str) -> list[ca.SX]:
+            return [
+                vector.scalar(
+                    f"{table}.{key}.{name}.{k}", f"{table}_{key}_{name}_{k}", unit, 0.0, f"{meaning} {k} of {key}"
+                )
+                for k in range(count)
+            ]
+
+        return signals.via_points(self.t, points("t", "s", "time of via point"), points("q", unit, "via point"))
+
+    def _sines(self, table: str, key: str, unit: str, count: int, vector: ParameterVector) -> Signal:
+        offset = ca.SX(0)
+        dotted = f"{table}.{key}"
+        if table == "reference":
+            offset = vector.scalar(
+                f"{dotted}.offset", f"{table}_{key}_offset", unit, 0.0, f"offset of the {key} reference"
+            )
+            dotted += ".terms"
+        terms = [
+            (
+                vector.scalar(
+                    f"{dotted}.{k}.amplitude",
+                    f"{table}_{key}_{k}_amplitude",
+                    unit,
+                    0.0,
+                    f"amplitude of {key} term {k}",
+                ),
+                vector.scalar(
+                    f"{dotted}.{k}.omega",
+                    f"{table}_{key}_{k}_omega",
+                    "rad/s",
+                    0.0,
+                    f"angular frequency of {key} term {k}",
+                ),
+                vector.scalar(
+                    f"{dotted}.{k}.phase",
+                    f"{table}_{key}_{k}_phase",
+                    "rad",
+                    0.0,
+                    f"phase of {key} term {k}",
+                ),
+            )
+            for k in range(count)
+        ]
+        return signals.sine_sum(self.t, offset, terms)
+
+    def _initial_values(self, vector: ParameterVector) -> dict[str, ca.SX]:
+        """Symbols of the [initial] table, n x 1 each."""
+        declared = [
+            ("q", "{}", "initial joint coordinate"),
+            ("dq", "{}/s", "initial joint rate"),
+            ("q_motor", "{}", "initial motor coordinate, where it is given"),
+        ]
+        if self.structure.drive == "rigid":
+            declared = declared[:2]
+        return {
             name: ca.vertcat(
                 *(
                     vector.scalar(
@@ -116,204 +233,131 @@ class System:
                     for i, joint in enumerate(self.joints)
                 )
             )
-            for name, unit, meaning in (
-                ("q", "{}", "initial joint coordinate"),
-                ("dq", "{}/s", "initial joint rate"),
-                ("q_motor", "{}", "initial motor coordinate, where it is given"),
-            )
+            for name, unit, meaning in declared
         }
-        self.d = ca.vertcat(*self._d)
-        self.p = vector.sx
-        self.slots: tuple[Slot, ...] = tuple(vector.slots)
 
-        self.q1d, self.dq1d, self.ddq1d = (ca.SX.sym(name, n) for name in ("q1d", "dq1d", "ddq1d"))
-        self.base = BaseMotion(*(ca.SX.sym(name, len(COORDINATES)) for name in ("b", "db", "ddb")))
-        self.w = ca.vertcat(self.q1d, self.dq1d, self.ddq1d, self.base.b, self.base.db, self.base.ddb)
-        self.q1, self.dq1, self.q2, self.dq2 = (ca.SX.sym(name, n) for name in ("q1", "dq1", "q2", "dq2"))
-        self.x = ca.vertcat(self.q1, self.dq1, self.q2, self.dq2)
-        self.u = ca.SX.sym("u", n)
+    # Equations
 
-    def _signals(
-        self,
-        table: Literal["reference", "base_motion"],
-        shape: SignalShape,
-        coordinates: list[tuple[str, str]],
-        vector: ParameterVector,
-    ) -> list[Signal]:
-        """Expressions of one vector signal; appends its parameters to `vector` or its data to d."""
-        if shape.kind == "none":
-            return [CONSTANT_ZERO] * len(coordinates)
-        if shape.kind == "table":
-            tau = ca.SX.sym(f"{table}_tau")
-            channels = tuple(i for i, count in enumerate(shape.terms) if count)
-            start = sum(symbol.numel() for symbol in self._d)
-            self.tables += (TableLayout(table, start, channels),)
-            blocks = {i: ca.SX.sym(f"{table}_{coordinates[i][0]}", 4) for i in channels}
-            self._d += [tau, *blocks.values()]
-            return [signals.cubic(tau, blocks[i]) if i in blocks else CONSTANT_ZERO for i in range(len(coordinates))]
-        result = []
-        for (key, unit), count in zip(coordinates, shape.terms, strict=True):
-            offset = ca.SX(0)
-            dotted = f"{table}.{key}"
-            if table == "reference":
-                offset = vector.scalar(
-                    f"{dotted}.offset", f"{table}_{key}_offset", unit, 0.0, f"offset of the {key} reference"
-                )
-                dotted += ".terms"
-            terms = [
-                (
-                    vector.scalar(
-                        f"{dotted}.{k}.amplitude",
-                        f"{table}_{key}_{k}_amplitude",
-                        unit,
-                        0.0,
-                        f"amplitude of {key} term {k}",
-                    ),
-                    vector.scalar(
-                        f"{dotted}.{k}.omega",
-                        f"{table}_{key}_{k}_omega",
-                        "rad/s",
-                        0.0,
-                        f"angular frequency of {key} term {k}",
-                    ),
-                    vector.scalar(
-                        f"{dotted}.{k}.phase",
-                        f"{table}_{key}_{k}_phase",
-                        "rad",
-                        0.0,
-                        f"phase of {key} term {k}",
-                    ),
-                )
-                for k in range(count)
-            ]
-            result.append(signals.sine_sum(self.t, offset, terms))
-        return result
-
-    def _column(self, parameters: tuple[Parameter, ...], values: Values) -> ca.SX:
-        return ca.vertcat(*(values[item.name] for item in parameters))
+    def _start(self, real: EquationsOfMotion) -> ca.SX:
+        """The state at the beginning, x, of t, d and p."""
+        q, dq = self._initial["q"], self._initial["dq"]
+        if self.structure.start == "reference":
+            q, dq, _ = ca.vertsplit(self._signal_expressions[: 3 * self.n], self.n)
+        if self.structure.drive == "rigid":
+            return ca.vertcat(q, dq)
+        stiffness = diagonal(self.mechanism.stiffness, self._plant)
+        if self.structure.start == "reference":
+            load = ca.substitute(
+                real.mass @ self.ddq1d + real.bias,
+                ca.vertcat(self.w, self.q1, self.dq1),
+                ca.vertcat(self._signal_expressions, q, dq),
+            )
+            return ca.vertcat(q, dq, static_motor_position(q, load, stiffness), dq)
+        motor = {
+            "unloaded": lambda: q,
+            "given": lambda: self._initial["q_motor"],
+            "equilibrium": lambda: static_motor_position(q, ca.substitute(real.gravity, self.q1, q), stiffness),
+        }[self.structure.initial_motor]()
+        return ca.vertcat(q, dq, motor, ca.SX.zeros(self.n))
 
     @cached_property
     def functions(self) -> dict[str, ca.Function]:
         """All Functions, parameters symbolic. Those of the paper's equations first, then the loop's."""
-        q1, dq1, x, u, w, p, base = self.q1, self.dq1, self.x, self.u, self.w, self.p, self.base
-        real = equations_of_motion(self.mechanism, q1, dq1, base, self._plant)
-        nominal = equations_of_motion(self.mechanism, q1, dq1, base, self._nominal)
-        m2, stiffness = (self._column(c, self._plant) for c in (self.mechanism.motor_inertia, self.mechanism.stiffness))
-        m2_nominal = self._column(self.mechanism.motor_inertia, self._nominal)
-        law = LAWS[self.structure.law]
-        signals_of_control = control(
+        real = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
+        nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal)
+        commanded = control(
             (self.q1d, self.dq1d, self.ddq1d),
-            x,
+            self._state,
             nominal,
-            m2_nominal,
+            diagonal(self.mechanism.motor_inertia, self._nominal),
             self._control,
-            law,
+            LAWS[self.structure.law],
             self.structure.log_form,
             self.structure.exponents,
         )
+        dx = self.drive.plant(self.x, self.u, real, self.mechanism, self._plant)
+        return {
+            **self._equations(real, commanded, dx),
+            **self._loop(real, commanded, dx),
+        }
+
+    def _function(
+        self, name: str, inputs: list[ca.SX], outputs: list[ca.SX], names_in: list[str], names_out: list[str]
+    ) -> dict[str, ca.Function]:
+        with as_written():
+            flat = ca.cse([ca.densify(o) for o in outputs])
+            return {name: ca.Function(name, [*inputs, self.p], flat, [*names_in, "p"], names_out)}
+
+    def _equations(self, real: EquationsOfMotion, commanded: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
+        """The equations of docs/paper.md, as they are offered to others."""
+        q1, dq1, x, base, function = self.q1, self.dq1, self.x, self.base, self._function
+        m2 = diagonal(self.mechanism.motor_inertia, self._plant)
         u_slow, u_fast, eta, sigma = (
             ca.SX.sym(name, n) for name, n in (("u_s", self.n), ("u_f", self.n), ("eta", self.n), ("sigma", 1))
         )
         ref_in, ref_names = [self.q1d, self.dq1d, self.ddq1d], ["q1d", "dq1d", "ddq1d"]
         base_in, base_names = [base.b, base.db, base.ddb], ["b", "db", "ddb"]
-        dx = plant(x, u, real, m2, stiffness)
-        s = signals_of_control
-
-        def function(
-            name: str, inputs: list[ca.SX], outputs: list[ca.SX], names_in: list[str], names_out: list[str]
-        ) -> ca.Function:
-            with as_written():
-                flat = ca.cse([ca.densify(o) for o in outputs])
-                return ca.Function(name, [*inputs, p], flat, [*names_in, "p"], names_out)
-
-        start_motor = {
-            "unloaded": lambda: self._initial["q"],
-            "given": lambda: self._initial["q_motor"],
-            "equilibrium": lambda: ca.substitute(
-                static_motor_position(q1, real.gravity, stiffness), q1, self._initial["q"]
-            ),
-        }[self.structure.initial_motor]()
         slow_args, slow_names = [*base_in, q1, dq1, u_slow], [*base_names, "q1", "dq1", "u_s"]
-        built = [
-            function("mass_matrix", [q1], [real.mass], ["q1"], ["M1"]),
-            function("coriolis", [q1, dq1], [real.coriolis], ["q1", "dq1"], ["C_dq1"]),
-            function("gravity", [q1], [real.gravity], ["q1"], ["G"]),
-            function("base_disturbance", [*base_in, q1, dq1], [real.disturbance], [*base_names, "q1", "dq1"], ["S"]),
-            function("plant", [*base_in, x, u], [dx], [*base_names, "x", "u"], ["dx"]),
-            function(
-                "slow_dynamics",
-                slow_args,
-                [perturbation.slow_dynamics(u_slow, real.disturbance, real, m2)],
-                slow_names,
-                ["ddq1"],
-            ),
-            function(
-                "quasi_steady_force",
-                slow_args,
-                [perturbation.quasi_steady_force(u_slow, real.disturbance, real, m2)],
-                slow_names,
-                ["z_bar"],
-            ),
-            function(
-                "fast_dynamics",
-                [q1, eta, u_fast],
-                [perturbation.fast_dynamics(eta, u_fast, real.mass, m2, stiffness, self._nominal.epsilon)],
-                ["q1", "eta", "u_f"],
-                ["ddeta"],
-            ),
-            function(
-                "slow_control",
-                [*ref_in, x],
-                [s.slow, s.error, s.sigma],
-                [*ref_names, "x"],
-                ["u_s", "e", "sigma"],
-            ),
-            function(
-                "fast_control",
-                [dq1, self.dq2],
-                [fast_control(dq1, self.dq2, self._control.K_f)],
-                ["dq1", "dq2"],
-                ["u_f"],
-            ),
-            function(
+        slow = perturbation.slow_dynamics(u_slow, real.disturbance, real, m2)
+        parts, part_names = list(commanded.parts.values()), [item.name.lower() for item in commanded.parts]
+        result = {
+            **function("mass_matrix", [q1], [real.mass], ["q1"], ["M1"]),
+            **function("coriolis", [q1, dq1], [real.coriolis], ["q1", "dq1"], ["C_dq1"]),
+            **function("gravity", [q1], [real.gravity], ["q1"], ["G"]),
+            **function("base_disturbance", [*base_in, q1, dq1], [real.disturbance], [*base_names, "q1", "dq1"], ["S"]),
+            **function("plant", [*base_in, x, self.u], [dx], [*base_names, "x", "u"], ["dx"]),
+            **function("slow_dynamics", slow_args, [slow], slow_names, ["ddq1"]),
+        }
+        if self.structure.drive == "elastic":
+            stiffness = diagonal(self.mechanism.stiffness, self._plant)
+            steady = perturbation.quasi_steady_force(u_slow, real.disturbance, real, m2)
+            fast = perturbation.fast_dynamics(eta, u_fast, real.mass, m2, stiffness, self._nominal.epsilon)
+            dq2 = self._state[DQ2]
+            result |= {
+                **function("quasi_steady_force", slow_args, [steady], slow_names, ["z_bar"]),
+                **function("fast_dynamics", [q1, eta, u_fast], [fast], ["q1", "eta", "u_f"], ["ddeta"]),
+                **function(
+                    "fast_control", [dq1, dq2], [fast_control(dq1, dq2, self._control.K_f)], ["dq1", "dq2"], ["u_f"]
+                ),
+            }
+        slow_outputs = [commanded.parts[U_S], commanded.error, commanded.sigma]
+        result |= {
+            **function("slow_control", [*ref_in, x], slow_outputs, [*ref_names, "x"], ["u_s", "e", "sigma"]),
+            **function(
                 "control",
                 [*ref_in, x],
-                [s.command, s.slow, s.fast, s.error, s.sigma],
+                [commanded.command, *parts, commanded.error, commanded.sigma],
                 [*ref_names, "x"],
-                ["u", "u_s", "u_f", "e", "sigma"],
+                ["u", *part_names, "e", "sigma"],
             ),
-            *(
-                function(
-                    f"law_{each.name}",
-                    [sigma],
-                    [each.rate(sigma, self._control, self.structure.log_form)],
-                    ["sigma"],
-                    ["dsigma"],
-                )
-                for each in LAWS.values()
-            ),
-            function("energy", [x], [self._energy(m2, stiffness)], ["x"], ["energy"]),
-            function("slow_mass", [q1], [perturbation.slow_mass(real.mass, m2)], ["q1"], ["H"]),
-            function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
-            function(
-                "start",
-                [],
-                [ca.vertcat(self._initial["q"], self._initial["dq"], start_motor, ca.SX.zeros(self.n))],
-                [],
-                ["x"],
-            ),
-            function("loop_control", [w, x], [s.command, s.error, s.sigma], ["w", "x"], ["u", "e", "sigma"]),
-            function("loop_error", [w, x], [s.error, s.sigma], ["w", "x"], ["e", "sigma"]),
-            function("loop_plant", [w, x, u], [dx], ["w", "x", "u"], ["dx"]),
-        ]
-        return {item.name(): item for item in built}
+        }
+        for law in LAWS.values():
+            rate = law.rate(sigma, self._control, self.structure.log_form)
+            result |= function(f"law_{law.name}", [sigma], [rate], ["sigma"], ["dsigma"])
+        energy = self._arm_energy() + self.drive.energy(x, self.mechanism, self._plant)
+        return {
+            **result,
+            **function("energy", [x], [energy], ["x"], ["energy"]),
+            **function("slow_mass", [q1], [perturbation.slow_mass(real.mass, m2)], ["q1"], ["H"]),
+        }
 
-    def _energy(self, m2: ca.SX, stiffness: ca.SX) -> ca.SX:
-        """Total energy with the base at rest, J: arm, motors, springs."""
+    def _loop(self, real: EquationsOfMotion, commanded: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
+        """What the simulation loop consists of."""
+        w, x, function, s = self.w, self.x, self._function, commanded
+        computed, names = [s.command, s.error, s.sigma], ["u", "e", "sigma"]
+        return {
+            **function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
+            **function("start", [self.t, self.d], [self._start(real)], ["t", "d"], ["x"]),
+            **function("loop_control", [w, x], computed, ["w", "x"], names),
+            **function("loop_error", [w, x], [s.error, s.sigma], ["w", "x"], ["e", "sigma"]),
+            **function("loop_plant", [w, x, self.u], [dx], ["w", "x", "u"], ["dx"]),
+        }
+
+    def _arm_energy(self) -> ca.SX:
+        """Kinetic and potential energy of the arm with the base at rest, J."""
         rest, up = ca.SX.zeros(3), ca.vertcat(0, self._plant.g, 0)
-        arm = self.mechanism.kinetic_energy(self.q1, self.dq1, rest, self._plant)
-        weight = self.mechanism.potential_energy(self.q1, up, self._plant)
-        return arm + weight + (ca.dot(m2, self.dq2**2) + ca.dot(stiffness, (self.q2 - self.q1) ** 2)) / 2
+        moving = self.mechanism.kinetic_energy(self.q1, self.dq1, rest, self._plant)
+        return moving + self.mechanism.potential_energy(self.q1, up, self._plant)
 
     def function(self, name: str) -> ca.Function:
         """The Function `name`; KeyError lists the names there are."""

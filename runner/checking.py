@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
 
 from springline.model.base import COORDINATES
+from springline.model.drive import DRIVES, DriveKind
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE
 from springline.model.system import Structure
@@ -44,7 +46,9 @@ def resolve(raw: Mapping[str, object], where: str, folder: Path) -> tuple[Docume
         given_name = schema.given_text(mechanism)
         problems.append(Problem(where, key, "unknown mechanism", given_name, name, tuple(MECHANISMS)))
         raise InputError(*problems)  # which keys are valid depends on it
-    shape = schema.schema(mechanism)
+    # Likewise for the drive, whose kind decides what the plant and the controller can be told.
+    drive = given["drive"].get("kind", schema.DEFAULT_KINDS["drive"])
+    shape = schema.schema(mechanism, cast(DriveKind, drive if drive in DRIVES else schema.DEFAULT_KINDS["drive"]))
 
     # Tables and keys that are wrong are left out of the document; the checks below skip what is not there.
     document: Document = {}
@@ -52,8 +56,7 @@ def resolve(raw: Mapping[str, object], where: str, folder: Path) -> tuple[Docume
     for name in schema.TABLES:
         section = shape.sections.get(name)
         if section is None:
-            kinds, default = (shape.reference, "sine") if name == "reference" else (shape.base_motion, "none")
-            chosen = _section_of_kind(kinds, default, given[name], name, where)
+            chosen = _section_of_kind(shape.kinds[name], schema.DEFAULT_KINDS[name], given[name], name, where)
             if isinstance(chosen, list):
                 problems += chosen
                 document[name] = {}
@@ -64,6 +67,8 @@ def resolve(raw: Mapping[str, object], where: str, folder: Path) -> tuple[Docume
         if not wrong and document[name].get("kind") == "table":
             with_table.append(name)
 
+    problems += _start_problems(document["initial"], given["initial"], where)
+    problems += _via_point_problems(document["reference"], where)
     problems += _exponent_problems(document["control"], where)
     problems += _sampling_problems(document, given["control"], where)
     problems += _whole_problems(document, "simulation.duration", where)
@@ -108,6 +113,43 @@ def _section_of_kind(
         if of
     ]
     return misplaced or (kinds[kind], table | {"kind": kind})
+
+
+_STARTS = ("q", "dq", "q_motor")
+
+
+def _start_problems(initial: dict[str, Any], given: Mapping[str, object], where: str) -> list[Problem]:
+    """A run starts on the reference or where it is told; `initial` keeps what counts."""
+    if not initial.pop("on_reference", False):
+        return []
+    problems = [
+        Problem(
+            where, f"initial.{name}", "does not go with initial.on_reference = true", schema.given_text(given[name])
+        )
+        for name in _STARTS
+        if name in given
+    ]
+    for name in _STARTS:
+        initial.pop(name, None)
+    initial["on_reference"] = True
+    return problems
+
+
+def _via_point_problems(reference: Mapping[str, Any], where: str) -> list[Problem]:
+    """A polynomial reference has as many times as values, and its times ascend."""
+    problems = []
+    for name, points in reference.items() if reference.get("kind") == "polynomial" else ():
+        if name == "kind":
+            continue
+        key, t, q = f"reference.{name}", points["t"], points["q"]
+        if len(t) != len(q):
+            problems.append(Problem(where, key, "expected as many values q as times t", f"{len(q)} and {len(t)}"))
+        problems += [
+            Problem(where, f"{key}.t.{i + 1}", f"expected a time later than the one before, {early!r} s", f"{late!r} s")
+            for i, (early, late) in enumerate(pairwise(t))
+            if late <= early
+        ]
+    return problems
 
 
 def _exponent_problems(control: Mapping[str, Any], where: str) -> list[Problem]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from springline.model.base import COORDINATES
+from springline.model.drive import DRIVES, DriveKind
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE, Bounds
 from springline.model.sliding import LogForm, SurfaceExponents
@@ -115,7 +116,8 @@ class Scenario:
 
     def structure(self) -> Structure:
         """Everything about the scenario that is no number."""
-        control, motor = self.document["control"], self.document["initial"]["q_motor"]
+        control, initial = self.document["control"], self.document["initial"]
+        motor = initial.get("q_motor", "unloaded")
         mechanism = self.document["mechanism"]["name"]
         joints = [joint.name for joint in MECHANISMS[mechanism].joints]
         return Structure(
@@ -126,6 +128,8 @@ class Scenario:
             reference=_shape(self.document["reference"], joints),
             base_motion=_shape(self.document["base_motion"], [c.key for c in COORDINATES]),
             initial_motor=cast(MotorStart, motor if isinstance(motor, str) else "given"),
+            drive=cast(DriveKind, self.document["drive"]["kind"]),
+            start="reference" if initial.get("on_reference") else "given",
         )
 
     def system(self) -> System:
@@ -211,8 +215,8 @@ class Scenario:
             return numbers[nominal] * numbers.get(scale_key(key), 1.0)
         if name.startswith("K_f.") and not self.document["control"]["fast"]:
             return 0.0 * numbers[key]
-        if name.startswith("q_motor.") and key not in numbers:
-            return 0.0  # not read: the structure says how the motors start
+        if table == "initial" and key not in numbers:
+            return 0.0  # not read: the structure says how the run starts
         return numbers[key]
 
     # Changed and written
@@ -226,18 +230,10 @@ class Scenario:
         expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
         if not overrides:
             return self
-        document = copy.deepcopy(self.document)
-        for table in ("reference", "base_motion"):
-            kind = overrides.get(f"{table}.kind", document[table]["kind"])
-            if kind != document[table]["kind"]:
-                document[table] = {"kind": kind}
-        if overrides.get("control.mode") == "continuous":
-            document["control"].pop("period", None)
-        if overrides.get("mechanism.name", self.document["mechanism"]["name"]) != self.document["mechanism"]["name"]:
-            control = {k: v for k, v in document["control"].items() if not isinstance(v, list)}
-            document = {name: document[name] for name in ("base_motion", "simulation")} | {"control": control}
+        document = self._without_excluded(overrides)
         problems = []
-        joints = len(MECHANISMS[self.document["mechanism"]["name"]].joints)
+        mechanism = overrides.get("mechanism.name", self.document["mechanism"]["name"])
+        joints = len(MECHANISMS[str(mechanism)].joints) if mechanism in MECHANISMS else 1
         where = _overridden(self.source)
         for key, value in overrides.items():
             try:
@@ -247,6 +243,33 @@ class Scenario:
         if problems:
             raise InputError(*problems)
         return Scenario(self.source, self.folder, *resolve(document, where, self.folder))
+
+    def _without_excluded(self, overrides: Mapping[str, object]) -> Document:
+        """A copy of the document without what the overrides exclude."""
+        document = copy.deepcopy(self.document)
+        for table in ("reference", "base_motion"):
+            kind = overrides.get(f"{table}.kind", document[table]["kind"])
+            if kind != document[table]["kind"]:
+                document[table] = {"kind": kind}
+        if overrides.get("control.mode") == "continuous":
+            document["control"].pop("period", None)
+        mechanism = document["mechanism"]["name"]
+        drive = overrides.get("drive.kind", document["drive"]["kind"])
+        if overrides.get("mechanism.name", mechanism) != mechanism:
+            control = {k: v for k, v in document["control"].items() if not isinstance(v, list)}
+            document = {name: document[name] for name in ("base_motion", "simulation")} | {"control": control}
+            document["drive"] = {"kind": drive}
+        elif drive in DRIVES and drive != document["drive"]["kind"]:
+            shape = schema.schema(mechanism, cast(DriveKind, drive))
+            sections = {name: shape.sections[name] for name in ("plant", "control", "initial")}
+            for name, section in (sections | {"drive": shape.kinds["drive"][str(drive)]}).items():
+                document[name] = {k: v for k, v in document[name].items() if k in section.model_fields}
+        given = {key.split(".")[1] for key in overrides if key.startswith("initial.")}
+        if overrides.get("initial.on_reference"):
+            document.pop("initial", None)
+        elif given & {"q", "dq", "q_motor"}:
+            document.get("initial", {}).pop("on_reference", None)
+        return document
 
     def to_toml(self) -> str:
         """The complete scenario as TOML; loading it gives an equal one."""
@@ -329,7 +352,7 @@ def _numeric_keys(structure: Structure) -> dict[str, NumericKey]:
     system, keys = _system(structure), {}
     groups: dict[str, list[str]] = {}
     for slot in system.slots:
-        if slot.key.startswith("initial.q_motor.") and structure.initial_motor != "given":
+        if slot.key.startswith("initial.") and _is_idle(slot.key, structure):
             continue
         unit = schema.unit_text(slot.unit, system.joints)
         keys[slot.key] = NumericKey(unit, slot.bounds, slot.meaning, (slot.key,))
@@ -348,14 +371,22 @@ def _numeric_keys(structure: Structure) -> dict[str, NumericKey]:
     return keys
 
 
+def _is_idle(key: str, structure: Structure) -> bool:
+    """Whether an initial value is not read, for the structure says how the run starts."""
+    if structure.start == "reference":
+        return True
+    return key.startswith("initial.q_motor.") and structure.initial_motor != "given"
+
+
 def _shape(table: Mapping[str, Any], coordinates: Sequence[str]) -> SignalShape:
     kind = cast(SignalKind, table["kind"])
     if kind == "table":
         return SignalShape(kind, tuple(int(name in table["columns"]) for name in coordinates))
     if kind == "none":
         return SignalShape(kind, (0,) * len(coordinates))
+    counted = {"polynomial": "t", "sine": "terms"}[kind]
     terms = (table[name] for name in coordinates)
-    return SignalShape(kind, tuple(len(t["terms"] if isinstance(t, dict) else t) for t in terms))
+    return SignalShape(kind, tuple(len(t[counted] if isinstance(t, dict) else t) for t in terms))
 
 
 def _first_outside(bounds: Bounds, column: Floats) -> int | None:

@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, Validat
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
 from springline.model.base import COORDINATES
-from springline.model.drive import EPSILON
-from springline.model.lagrange import Mechanism
+from springline.model.drive import DRIVES, EPSILON, DriveKind
+from springline.model.mechanism import Mechanism
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
 from springline.model.sliding import LAWS, LogForm
@@ -25,7 +25,7 @@ from springline.runner.tables import ENDS, UNITS
 from springline.runner.toml_text import value_text
 
 Mode = Literal["continuous", "sampled"]
-Kind = Literal["none", "sine", "table"]
+Kind = Literal["none", "sine", "polynomial", "table"]
 
 INTEGRATORS = ("rk4",)
 MOTOR_STARTS = ("unloaded", "equilibrium")
@@ -161,6 +161,18 @@ def choice(kind: str, names: Iterable[str]) -> Leaf:
     return Leaf(" or ".join(f'"{name}"' for name in names), check)
 
 
+def several(item: Leaf) -> Leaf:
+    """A list of at least one."""
+    expected = f"a list, not empty, each {item.expected}"
+
+    def check(value: object) -> list[Any]:
+        if not isinstance(value, list) or not value:
+            raise _wrong(f"expected {expected}")
+        return [_checked(item, entry, item.expected, at=(i,), given=entry) for i, entry in enumerate(value)]
+
+    return Leaf(expected, check)
+
+
 def motor_start(given: Leaf) -> Leaf:
     """How the springs stand at t = 0, by name or as motor coordinates."""
     named = choice("start of the motors", MOTOR_STARTS)
@@ -219,54 +231,70 @@ class NoMotion(Section):
 
 @dataclass(frozen=True)
 class Schema:
-    """The tables of a scenario for one mechanism.
+    """The tables of a scenario for one mechanism and kind of drive.
 
-    sections     table -> its keys, for the tables whose keys do not depend on a kind
-    reference    kind -> keys of [reference];  base_motion  likewise
+    sections  table -> its keys, for the tables whose keys do not depend on a kind
+    kinds     table -> kind -> its keys, for the others
     """
 
     sections: Mapping[str, type[Section]]
-    reference: Mapping[str, type[Section]]
-    base_motion: Mapping[str, type[Section]]
+    kinds: Mapping[str, Mapping[str, type[Section]]]
 
 
 TABLES = ("mechanism", "drive", "plant", "control", "reference", "base_motion", "initial", "simulation")
 
 
+DEFAULT_KINDS = {"drive": "elastic", "reference": "sine", "base_motion": "none"}
+"""Table -> the kind that it has where none is given."""
+
+
 @lru_cache
-def schema(name: str) -> Schema:
-    """The schema for the mechanism `name`."""
+def schema(name: str, drive: DriveKind) -> Schema:
+    """The schema for the mechanism `name` and a kind of drive."""
     mechanism = MECHANISMS[name]
     joints = mechanism.joints
-    arm, drive = mechanism.parameters, (*mechanism.motor_inertia, *mechanism.stiffness)
+    arm, moving = mechanism.parameters, DRIVES[drive].parameters(mechanism)
     named = (Annotated[str, choice("mechanism", MECHANISMS)], name)
     position, rate = (_each("{q}", REAL, joints), _each("{q}/s", REAL, joints))
     initial = {
         "q": (Annotated[Any, position], list(mechanism.start_position)),
         "dq": (Annotated[Any, rate], list(mechanism.start_rate)),
         "q_motor": (Annotated[Any, motor_start(position)], MOTOR_STARTS[0]),
+        "on_reference": (Annotated[bool, flag()], False),
     }
+    if drive == "rigid":
+        del initial["q_motor"]
     coordinates = {c.key: c.unit for c in COORDINATES}
     sines: dict[str, Any] = {key: (_terms(unit), []) for key, unit in coordinates.items()}
     return Schema(
         sections={
             "mechanism": _section("mechanism", {"name": named, **_numbers(arm, joints)}),
-            "drive": _section("drive", _numbers((*drive, EPSILON), joints)),
-            "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *drive)}),
-            "control": _section("control", _numbers(control_parameters(), joints), ControlStructure),
+            "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *moving)}),
+            "control": _section("control", _numbers(control_parameters(mechanism, drive), joints), ControlStructure),
             "initial": _section("initial", initial),
             "simulation": Simulation,
         },
-        reference={
-            "sine": _reference_sines(mechanism),
-            "table": _table_section({joint.name: joint.unit for joint in joints}),
-        },
-        base_motion={
-            "none": NoMotion,
-            "sine": _section("sine", {"kind": (Literal["sine"], ...), **sines}),
-            "table": _table_section(coordinates),
+        kinds={
+            "drive": {kind: _drive_section(kind, mechanism) for kind in DRIVES},
+            "reference": {
+                "sine": _reference_sines(mechanism),
+                "polynomial": _reference_polynomials(mechanism),
+                "table": _table_section({joint.name: joint.unit for joint in joints}),
+            },
+            "base_motion": {
+                "none": NoMotion,
+                "sine": _section("sine", {"kind": (Literal["sine"], ...), **sines}),
+                "table": _table_section(coordinates),
+            },
         },
     )
+
+
+def _drive_section(kind: str, mechanism: Mechanism) -> type[Section]:
+    """[drive] of one kind; only springs split the system into a slow and a fast one."""
+    parameters = DRIVES[kind].parameters(mechanism)
+    split = (EPSILON,) if kind == "elastic" else ()
+    return _section("drive", {"kind": (Literal[kind], kind), **_numbers((*parameters, *split), mechanism.joints)})
 
 
 def _section(name: str, fields: Mapping[str, Any], base: type[Section] = Section) -> type[Section]:
@@ -286,8 +314,12 @@ def _leaf(parameter: Parameter, joints: Sequence[Joint]) -> Leaf:
 
 def _numbers(parameters: Iterable[Parameter], joints: Sequence[Joint]) -> dict[str, Any]:
     """Fields of declared parameters."""
-    defaults = {p.name: list(p.default) if isinstance(p.default, tuple) else p.default for p in parameters}
-    return {item.name: (Annotated[Any, _leaf(item, joints)], defaults[item.name]) for item in parameters}
+
+    def default(item: Parameter) -> float | list[float]:
+        values = item.defaults(joints)
+        return list(values) if item.per_joint else values[0]
+
+    return {item.name: (Annotated[Any, _leaf(item, joints)], default(item)) for item in parameters}
 
 
 def _plant(parameter: Parameter, joints: Sequence[Joint]) -> Any:
@@ -316,6 +348,18 @@ def _reference_sines(mechanism: Mechanism) -> type[Section]:
         default = made.model_validate({"offset": mechanism.reference_offset[i], "terms": terms})
         fields[joint.name] = (made, default)
     return _section("sine", fields)
+
+
+def _reference_polynomials(mechanism: Mechanism) -> type[Section]:
+    """Via points of each joint; one that is not given stands where the mechanism starts."""
+    fields: dict[str, Any] = {"kind": (Literal["polynomial"], ...)}
+    for joint, start in zip(mechanism.joints, mechanism.start_position, strict=True):
+        made = _section(
+            joint.name,
+            {"t": (Annotated[Any, several(number("s"))], ...), "q": (Annotated[Any, several(number(joint.unit))], ...)},
+        )
+        fields[joint.name] = (made, made.model_validate({"t": [0.0], "q": [start]}))
+    return _section("polynomial", fields)
 
 
 def _table_section(units: Mapping[str, str]) -> type[Section]:

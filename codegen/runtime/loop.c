@@ -244,6 +244,7 @@ static void control_at_end(sl_pack *pack, int64_t k, sl_time now) {
 }
 
 static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock *clock) {
+  double d[SL_ND + 1] = {0.0}; /* without tables nothing reads it */
   int lane, i;
   pack->job = job;
   pack->clock = clock;
@@ -257,7 +258,8 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
     if (lane < pack->lanes && job->rows) job->rows[run] = 0;
   }
   kernel_run((const sl_group *)pack->p, pack->r);
-  kernel_start((const sl_group *)pack->p, (const sl_group *)pack->r, pack->x);
+  table_data(job->tables, job->start_time, d, 1);
+  kernel_start(job->start_time, d, (const sl_group *)pack->p, (const sl_group *)pack->r, pack->x);
   pack->times[0].varying = (const sl_group *)pack->varying[0];
   pack->times[2] = time_at(pack, 0, pack->varying[2]);
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from springline.model.lagrange import Mechanism
+from springline.model.mechanism import Mechanism
 from springline.model.mechanisms.transfer_manipulator import TransferManipulator
 
 MECHANISMS: dict[str, Mechanism] = {mechanism.name: mechanism for mechanism in (TransferManipulator(),)}

@@ -7,17 +7,18 @@ centroid is at (L1, y, 0), the rotating part's at (L1 + L3 cos theta, y + L3 sin
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import casadi as ca
 
+from springline.model.mechanism import Mechanism
 from springline.model.parameters import POSITIVE, REAL, Joint, Parameter, Values
 from springline.model.signals import SineTerm
 
 
-class TransferManipulator:
+class TransferManipulator(Mechanism):
     """Lift (prismatic, m) and rotation (revolute, rad) on a moving base."""
 
-    name = "transfer_manipulator"
     joints = (Joint("lift", "m", "N"), Joint("rotation", "rad", "N m"))
     parameters = (
         Parameter("m2", "kg", 10.0, "mass of the lifting part", POSITIVE),
@@ -39,7 +40,7 @@ class TransferManipulator:
     reference_offset = (0.0, 1.0)
     reference_terms = ((SineTerm(1.0, math.pi),), (SineTerm(1.0, math.pi / 2),))
     start_position = (0.8, 0.5)
-    start_rate = (0.0, 0.0)
+    control_defaults: ClassVar = {"mu": (12.0, 5.0), "K_f": (200.0, 2.6)}  # Table 3
 
     def positions(self, q: ca.SX, p: Values) -> tuple[ca.SX, ca.SX]:
         """Centroids of the lifting and the rotating part, 3 x 1, m, base frame."""

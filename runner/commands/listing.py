@@ -79,7 +79,7 @@ def parameters() -> list[Row]:
         tables = {
             "mechanism": mechanism.parameters,
             "drive": (*mechanism.motor_inertia, *mechanism.stiffness, EPSILON),
-            "control": control_parameters(),
+            "control": control_parameters(mechanism),
         }
         for table, declared in tables.items():
             for row in _rows(table, declared, mechanism.joints):

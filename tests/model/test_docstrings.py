@@ -7,7 +7,7 @@ import pkgutil
 
 import pytest
 
-from springline.model.lagrange import Mechanism
+from springline.model.mechanism import Mechanism
 from springline.model.sliding import ReachingLaw
 
 PACKAGES = ("springline.model", "springline.codegen", "springline.runner")

@@ -1,0 +1,81 @@
+"""What a mechanism has to tell: its joints, its parameters and its energies. Everything else has a default."""
+
+from __future__ import annotations
+
+import math
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import ClassVar
+
+import casadi as ca
+
+from springline.model.parameters import Joint, Parameter, Values
+from springline.model.signals import SineTerm
+
+# Of the critical damping of a motor on its spring: what the fast control adds unless a mechanism says otherwise.
+_FAST_DAMPING = 0.1
+
+
+class Mechanism(ABC):
+    """An arm of n joints, n >= 1. A subclass says at least its joints, parameters, motors, springs and two energies.
+
+    name              in scenario files: the class's name in snake_case unless the class says otherwise
+    joints            in the order of q
+    parameters        of the two energies; "g" is one of them
+    motor_inertia     diagonal of M2, one parameter per joint
+    stiffness         diagonal of K, one parameter per joint
+    reference_offset  constant part of the desired trajectory, one per joint; () for all zero
+    reference_terms   sine terms of the desired trajectory, a tuple per joint; () for none
+    start_position    initial joint coordinates; () for all zero
+    start_rate        initial joint rates; () for all zero
+    control_defaults  what the controller's parameters are for this arm, by name: a number, or one per joint
+    """
+
+    name: ClassVar[str]
+    joints: ClassVar[tuple[Joint, ...]]
+    parameters: ClassVar[tuple[Parameter, ...]]
+    motor_inertia: ClassVar[tuple[Parameter, ...]]
+    stiffness: ClassVar[tuple[Parameter, ...]]
+    reference_offset: ClassVar[tuple[float, ...]] = ()
+    reference_terms: ClassVar[tuple[tuple[SineTerm, ...], ...]] = ()
+    start_position: ClassVar[tuple[float, ...]] = ()
+    start_rate: ClassVar[tuple[float, ...]] = ()
+    control_defaults: ClassVar[Mapping[str, float | tuple[float, ...]]] = {}
+
+    def __init_subclass__(cls) -> None:
+        """Fill in what the class leaves open and depends on how many joints it has."""
+        cls.name = vars(cls).get("name", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower())
+        joints = getattr(cls, "joints", ())
+        for attribute in ("reference_offset", "start_position", "start_rate"):
+            if not getattr(cls, attribute):
+                setattr(cls, attribute, (0.0,) * len(joints))
+        if not cls.reference_terms:
+            cls.reference_terms = ((),) * len(joints)
+
+    @abstractmethod
+    def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX:
+        """T, J, seen from a frame that moves with the base origin.
+
+        q, dq  n x 1;  omega  3 x 1, angular velocity of the base, rad/s, base axes. The velocity of a point r(q) is
+        jtimes(r, q, dq) + cross(omega, r), base axes.
+        """
+
+    @abstractmethod
+    def potential_energy(self, q: ca.SX, gravity: ca.SX, p: Values) -> ca.SX:
+        """V, J.  gravity: 3 x 1 vector that points up, m/s^2, base axes."""
+
+    def fitted(self, parameter: Parameter) -> Parameter:
+        """A parameter of the controller with the default that suits this arm.
+
+        K_f, unless `control_defaults` has it, damps each motor on its spring with a tenth of the critical damping.
+        """
+        own = self.control_defaults.get(parameter.name)
+        if own is None and parameter.name == "K_f":
+            pairs = zip(self.motor_inertia, self.stiffness, strict=True)
+            own = tuple(
+                2 * _FAST_DAMPING * math.sqrt(inertia.defaults((joint,))[0] * spring.defaults((joint,))[0])
+                for joint, (inertia, spring) in zip(self.joints, pairs, strict=True)
+            )
+        return parameter if own is None else replace(parameter, default=own)
