@@ -24,8 +24,8 @@ class Mechanism(ABC):
     name              in scenario files: the class's name in snake_case unless the class says otherwise
     joints            in the order of q
     parameters        of the two energies; "g" is one of them
-    motor_inertia     diagonal of M2, one parameter per joint
-    stiffness         diagonal of K, one parameter per joint
+    motor_inertia     diagonal of M2: a parameter for each joint, or one with an entry per joint
+    stiffness         diagonal of K, likewise
     reference_offset  constant part of the desired trajectory, one per joint; () for all zero
     reference_terms   sine terms of the desired trajectory, a tuple per joint; () for none
     start_position    initial joint coordinates; () for all zero
@@ -73,9 +73,14 @@ class Mechanism(ABC):
         """
         own = self.control_defaults.get(parameter.name)
         if own is None and parameter.name == "K_f":
-            pairs = zip(self.motor_inertia, self.stiffness, strict=True)
-            own = tuple(
-                2 * _FAST_DAMPING * math.sqrt(inertia.defaults((joint,))[0] * spring.defaults((joint,))[0])
-                for joint, (inertia, spring) in zip(self.joints, pairs, strict=True)
-            )
+            inertia, stiffness = (self._diagonal(declared) for declared in (self.motor_inertia, self.stiffness))
+            own = tuple(2 * _FAST_DAMPING * math.sqrt(m * k) for m, k in zip(inertia, stiffness, strict=True))
         return parameter if own is None else replace(parameter, default=own)
+
+    def _diagonal(self, declared: tuple[Parameter, ...]) -> list[float]:
+        """Defaults of a diagonal, one per joint."""
+        return [
+            value
+            for k, item in enumerate(declared)
+            for value in item.defaults(self.joints if item.per_joint else self.joints[k : k + 1])
+        ]

@@ -1,13 +1,20 @@
-"""What all tests share: one kernel cache, one rule for missing tools, no deadlines."""
+"""What all tests share: one kernel cache, one rule for missing tools, no deadlines, two other arms."""
 
 import os
 import shutil
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import ClassVar
 
+import casadi as ca
 import pytest
 from hypothesis import settings
+
+from springline.model.mechanism import Mechanism
+from springline.model.mechanisms import MECHANISMS
+from springline.model.parameters import POSITIVE, Joint, Parameter, Values
+from springline.model.signals import SineTerm
 
 # Two cores shared by several workers: a wall-clock deadline would fail at random. In CI a red test must be
 # red again on the next machine, so examples are drawn from a fixed seed.
@@ -51,3 +58,71 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     if os.environ.get("CI") == "true" and reporter is not None and reporter.stats.get("skipped"):
         reporter.write_line(f"{len(reporter.stats['skipped'])} tests were skipped, and in CI none may be")
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+class _PlanarArm(Mechanism):
+    """Links of 1 kg and 0.5 m with their mass in the middle, turning about z one after the other."""
+
+    parameters = (
+        Parameter("mass", "kg", 1.0, "mass of a link", POSITIVE, per_joint=True),
+        Parameter("length", "m", 0.5, "length of a link", POSITIVE, per_joint=True),
+        Parameter("inertia", "kg m^2", 0.02, "inertia of a link about its centroid", POSITIVE, per_joint=True),
+        Parameter("g", "m/s^2", 9.81, "gravity"),
+    )
+    motor_inertia = (Parameter("rotor", "kg m^2", 0.05, "inertia of a motor", POSITIVE, per_joint=True),)
+    stiffness = (Parameter("spring", "{F}/{q}", 4.0e3, "stiffness of a spring", POSITIVE, per_joint=True),)
+
+    def _centroids(self, q: ca.SX, p: Values) -> list[ca.SX]:
+        places, joint, angle = [], ca.SX.zeros(3), ca.SX(0)
+        for i in range(q.numel()):
+            angle = angle + q[i]
+            along = p.length[i] * ca.vertcat(ca.cos(angle), ca.sin(angle), 0)
+            places.append(joint + along / 2)
+            joint = joint + along
+        return places
+
+    def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX:
+        energy, turning = ca.SX(0), omega[2]
+        for i, r in enumerate(self._centroids(q, p)):
+            v = ca.jtimes(r, q, dq) + ca.cross(omega, r)
+            turning = turning + dq[i]
+            energy = energy + (p.mass[i] * ca.dot(v, v) + p.inertia[i] * turning**2) / 2
+        return energy
+
+    def potential_energy(self, q: ca.SX, gravity: ca.SX, p: Values) -> ca.SX:
+        places = self._centroids(q, p)
+        return sum((p.mass[i] * ca.dot(gravity, r) for i, r in enumerate(places)), ca.SX(0))
+
+
+class OneLink(_PlanarArm):
+    """One joint."""
+
+    joints = (Joint("elbow", "rad", "N m"),)
+
+
+class ThreeLinks(_PlanarArm):
+    """Three joints, one of them with gains of its own, off their reference at first."""
+
+    joints = (Joint("shoulder", "rad", "N m"), Joint("elbow", "rad", "N m"), Joint("wrist", "rad", "N m"))
+    reference_offset = (0.5, -0.4, 0.3)
+    reference_terms = ((SineTerm(0.2, 2.0),), (SineTerm(0.1, 3.0), SineTerm(0.05, 5.0)), ())
+    start_position = (0.6, -0.5, 0.2)
+    control_defaults: ClassVar = {"mu": (8.0, 6.0, 5.0)}
+
+
+OTHER_ARMS: tuple[Mechanism, ...] = (OneLink(), ThreeLinks())
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _other_arms() -> Iterator[None]:
+    """Arms with one and with three joints, known by name as the packaged ones are."""
+    MECHANISMS.update({arm.name: arm for arm in OTHER_ARMS})
+    yield
+    for arm in OTHER_ARMS:
+        del MECHANISMS[arm.name]
+
+
+@pytest.fixture(params=[arm.name for arm in OTHER_ARMS])
+def other_arm(request: pytest.FixtureRequest) -> str:
+    """The name of an arm that is not the paper's."""
+    return str(request.param)

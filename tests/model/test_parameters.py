@@ -76,7 +76,8 @@ def test_vector_of_a_table():
     values = vector.table(
         "control",
         [
-            Parameter("mu", "{F}/{q}", (1.0, 2.0), "gain", POSITIVE),
+            Parameter("mu", "{F}/{q}", (1.0, 2.0), "gain", POSITIVE, per_joint=True),
+            Parameter("k", "{F}", 3.0, "stiffness", POSITIVE, per_joint=True),
             Parameter("delta", "{q}", 0.05, "layer", NON_NEGATIVE),
             Parameter("zeta", "1", 0.9, "exponent", UNIT_OPEN),
         ],
@@ -85,18 +86,21 @@ def test_vector_of_a_table():
     assert [(s.key, s.symbol, s.unit, s.default, s.meaning) for s in vector.slots] == [
         ("control.mu.0", "control_mu_lift", "N/m", 1.0, "gain (lift)"),
         ("control.mu.1", "control_mu_rotation", "N m/rad", 2.0, "gain (rotation)"),
+        ("control.k.0", "control_k_lift", "N", 3.0, "stiffness (lift)"),
+        ("control.k.1", "control_k_rotation", "N m", 3.0, "stiffness (rotation)"),
         ("control.delta", "control_delta", "m or rad", 0.05, "layer"),
         ("control.zeta", "control_zeta", "1", 0.9, "exponent"),
     ]
-    assert vector.sx.shape == (4, 1)
+    assert vector.sx.shape == (6, 1)
     assert [symbol.name() for symbol in ca.vertsplit(vector.sx)] == [slot.symbol for slot in vector.slots]
     assert values.mu.shape == (2, 1)
     assert values["zeta"].name() == "control_zeta"
 
 
 def test_a_default_for_every_joint_is_demanded():
-    with pytest.raises(ValueError, match="zip"):
-        ParameterVector().table("control", [Parameter("mu", "1", (1.0, 2.0, 3.0), "gain")], JOINTS)
+    mu = Parameter("mu", "1", (1.0, 2.0, 3.0), "gain", per_joint=True)
+    with pytest.raises(ValueError, match=r"mu has 3 defaults, expected one per joint \(lift, rotation\)"):
+        ParameterVector().table("control", [mu], JOINTS)
 
 
 def test_values_are_a_mapping_with_attributes():
@@ -169,7 +173,9 @@ def test_every_mechanism_declares_what_the_system_needs():
     for name, mechanism in MECHANISMS.items():
         assert mechanism.name == name
         assert "g" in [item.name for item in mechanism.parameters]
-        assert len(mechanism.motor_inertia) == len(mechanism.stiffness) == len(mechanism.joints)
+        for declared in (mechanism.motor_inertia, mechanism.stiffness):
+            entries = [value for item in declared for value in item.defaults(mechanism.joints)]
+            assert len(entries) == len(mechanism.joints)
         assert all(item.meaning for item in mechanism.parameters)
 
 
@@ -189,7 +195,7 @@ def test_start(make_model):
     ):
         model = make_model(Structure(initial_motor=start))
         p = model.p(given_)
-        x = model("start", p=p)
+        x = model("start", np.zeros(1), np.zeros(0), p=p)
         np.testing.assert_allclose(x, [0.8, 0.5, 0.0, 2.0, *motor, 0.0, 0.0], rtol=1e-15)
         if start == "equilibrium":
             rest = (np.zeros(3),) * 3

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from springline.model.control import control
-from springline.model.drive import plant
+from springline.model.drive import DRIVES
 from springline.model.lagrange import equations_of_motion
 from springline.model.parameters import Values
 from springline.model.sliding import LAWS, SurfaceExponents, reaching_rate, surface
@@ -282,12 +282,14 @@ def largest_real_part():
     p = Values({"delta": delta, "mu": ca.SX([12, 5]), "lambda": ca.SX(5), "K_f": gain * ca.SX([200, 2.6]),
                 "a_max": ca.SX([math.inf] * 2), "U_max": ca.SX([math.inf] * 2)})  # fmt: skip
     arm = Values({item.name: ca.SX.sym(item.name) for item in system.mechanism.parameters})
-    inertia, stiffness = ca.SX([2.0, 0.01]), ca.SX([2e6, 2e4])
+    inertia = ca.SX([2.0, 0.01])
+    motors = Values({"m_l": ca.SX(2.0), "I": ca.SX(0.01), "k_s2": ca.SX(2e6), "k_s3": ca.SX(2e4)})
     link = equations_of_motion(system.mechanism, system.q1, system.dq1, system.base, arm)
     zero = ca.SX.zeros(2)
     reference = (system.q1d, zero, zero)
-    command = control(reference, system.x, link, inertia, p, Linear(slope), "power", SurfaceExponents()).command
-    flow = plant(system.x, command, link, inertia, stiffness)
+    y = dict(zip(system.drive.state, ca.vertsplit(system.x, 2), strict=True))
+    command = control(reference, y, link, inertia, p, Linear(slope), "power", SurfaceExponents()).command
+    flow = DRIVES["elastic"].plant(system.x, command, link, system.mechanism, motors)
     base = ca.vertcat(system.base.b, system.base.db, system.base.ddb)
     arguments = [system.x, system.q1d, base, ca.vertcat(*arm.values()), delta, slope, gain]
     f = ca.Function("flow", arguments, [flow, ca.jacobian(flow, system.x)])
