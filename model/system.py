@@ -344,7 +344,7 @@ class System:
     def _loop(self, real: EquationsOfMotion, commanded: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
         """What the simulation loop consists of."""
         w, x, function, s = self.w, self.x, self._function, commanded
-        computed, names = [s.command, s.error, s.sigma], ["u", "e", "sigma"]
+        computed, names = [s.command, s.error, s.sigma, s.wished], ["u", "e", "sigma", "wished"]
         return {
             **function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
             **function("start", [self.t, self.d], [self._start(real)], ["t", "d"], ["x"]),
