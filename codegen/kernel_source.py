@@ -12,6 +12,7 @@ from typing import Literal
 
 from springline.codegen import casadi_c, lanes, toolchain
 from springline.codegen.program import Program
+from springline.codegen.stepping import kernel_update
 from springline.model.base import COORDINATES
 
 Engine = Literal["lanes", "casadi"]
@@ -103,7 +104,8 @@ enum {{ {enum} }};
 #else
 #define SL_EVALUATION static inline
 #endif
-"""
+
+{kernel_update(program.system.tableau)}"""
 
 
 def print_kernel(

@@ -19,6 +19,7 @@ from springline.model import perturbation, signals
 from springline.model.base import COORDINATES, BaseMotion
 from springline.model.control import K_F, U_MAX, ControlSignals, control, fast_control
 from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
+from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.lagrange import EquationsOfMotion, equations_of_motion
 from springline.model.linear import as_written
 from springline.model.mechanism import Mechanism
@@ -62,6 +63,7 @@ class Structure:
     initial_motor: MotorStart = "unloaded"
     drive: DriveKind = "elastic"
     start: JointStart = "given"
+    integrator: str = "rk4"
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +102,7 @@ class System:
         self.structure = structure or Structure()
         self.mechanism: Mechanism = MECHANISMS[self.structure.mechanism]
         self.drive: Drive = DRIVES[self.structure.drive]
+        self.tableau: Tableau = INTEGRATORS[self.structure.integrator]
         self.joints: tuple[Joint, ...] = self.mechanism.joints
         self.n = n = len(self.joints)
 

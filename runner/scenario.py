@@ -130,6 +130,7 @@ class Scenario:
             initial_motor=cast(MotorStart, motor if isinstance(motor, str) else "given"),
             drive=cast(DriveKind, self.document["drive"]["kind"]),
             start="reference" if initial.get("on_reference") else "given",
+            integrator=self.integrator,
         )
 
     def system(self) -> System:

@@ -16,6 +16,7 @@ from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_sc
 from springline.codegen.kernel import MOST_STEPS
 from springline.model.base import COORDINATES
 from springline.model.drive import DRIVES, EPSILON, DriveKind
+from springline.model.integrators import INTEGRATORS
 from springline.model.mechanism import Mechanism
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
@@ -28,7 +29,6 @@ from springline.runner.toml_text import value_text
 Mode = Literal["continuous", "sampled"]
 Kind = Literal["none", "sine", "polynomial", "table"]
 
-INTEGRATORS = ("rk4",)
 MOTOR_STARTS = ("unloaded", "equilibrium")
 
 _DEFAULT = Structure()
@@ -220,7 +220,7 @@ class Simulation(Section):
 
     duration: Annotated[float, number("s", POSITIVE)] = 4.0
     step: Annotated[float, number("s", POSITIVE)] = 1e-4
-    integrator: Annotated[str, choice("integrator", INTEGRATORS)] = INTEGRATORS[0]
+    integrator: Annotated[str, choice("integrator", INTEGRATORS)] = _DEFAULT.integrator
     output_every: Annotated[int, whole(MOST_STEPS)] = 10
     bound: Annotated[float, number("SI", LIMIT)] = 1e6
     response_band: Annotated[float, number("1", UNIT_OPEN)] = 0.10

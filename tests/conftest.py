@@ -100,6 +100,23 @@ class OneLink(_PlanarArm):
     joints = (Joint("elbow", "rad", "N m"),)
 
 
+class Slider(Mechanism):
+    """A mass that slides up and down: linear, so that its motion can be written down."""
+
+    joints = (Joint("lift", "m", "N"),)
+    parameters = (Parameter("m", "kg", 3.0, "mass", POSITIVE), Parameter("g", "m/s^2", 9.81, "gravity"))
+    motor_inertia = (Parameter("motor", "kg", 1.0, "mass of the motor", POSITIVE),)
+    stiffness = (Parameter("spring", "N/m", 50.0, "stiffness of the spring", POSITIVE),)
+
+    def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX:
+        r = ca.vertcat(0, q, 0)
+        v = ca.jtimes(r, q, dq) + ca.cross(omega, r)
+        return p.m * ca.dot(v, v) / 2
+
+    def potential_energy(self, q: ca.SX, gravity: ca.SX, p: Values) -> ca.SX:
+        return p.m * gravity[1] * q
+
+
 class ThreeLinks(_PlanarArm):
     """Three joints, one of them with gains of its own, off their reference at first."""
 
@@ -110,7 +127,7 @@ class ThreeLinks(_PlanarArm):
     control_defaults: ClassVar = {"mu": (8.0, 6.0, 5.0)}
 
 
-OTHER_ARMS: tuple[Mechanism, ...] = (OneLink(), ThreeLinks())
+OTHER_ARMS: tuple[Mechanism, ...] = (OneLink(), ThreeLinks(), Slider())
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -122,7 +139,7 @@ def _other_arms() -> Iterator[None]:
         del MECHANISMS[arm.name]
 
 
-@pytest.fixture(params=[arm.name for arm in OTHER_ARMS])
+@pytest.fixture(params=[arm.name for arm in OTHER_ARMS if arm.name != "slider"])
 def other_arm(request: pytest.FixtureRequest) -> str:
     """The name of an arm that is not the paper's."""
     return str(request.param)

@@ -5,10 +5,12 @@
  * from a generator and provides
  *   sizes        SL_W SL_G SL_PACKS; SL_NJ joints, SL_NX states, SL_NB base coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV
  *                (values bound once per run; once per time and the same for all runs; once per time and run),
- *                SL_ND, SL_NTABLES, SL_TABLE_CHANNELS; SL_SAMPLED 0 or 1
+ *                SL_ND, SL_NTABLES; SL_SAMPLED 0 or 1
  *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
- * Times are t = start + (j / 2) h for half steps j, never accumulated.
+ *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
+ *                needed for long), sl_node, sl_when, sl_kept, kernel_update
+ * Times are t = start + (k + c) h for step k and node c, never accumulated.
  */
 #include <fenv.h>
 #include <float.h>
@@ -22,8 +24,8 @@
 enum {
   SL_PACK = SL_W * SL_G,
   SL_NMETRICS = SL_NJ * SL_METRICS_PER_JOINT,
-  SL_BLOCK = SL_W > 2 ? SL_W : 2, /* half steps whose uniform signals are evaluated together */
-  SL_NCOLUMNS = 1 + 8 * SL_NJ + SL_NB
+  SL_BLOCK = (SL_INSTANTS + SL_W - 1) / SL_W * SL_W, /* instants whose uniform signals are evaluated together */
+  SL_NCOLUMNS = 1 + SL_NX + 4 * SL_NJ + SL_NB
 };
 
 /* ---- signals ------------------------------------------------------------------------------------------- */
@@ -50,13 +52,18 @@ static void table_data(const sl_table *tables, double t, double *d, int stride) 
 
 typedef struct {
   const sl_job *job;
-  sl_v uniform[2][SL_BLOCK / SL_W][SL_NU + 1]; /* two blocks of half steps, a lane each */
+  sl_v uniform[2][SL_BLOCK / SL_W][SL_NU + 1]; /* two blocks of instants, a lane each: those of a step are in no more */
   int64_t block[2];                            /* which blocks are held */
 } sl_clock;
 
-static double half_step_time(const sl_job *job, int64_t j) { return job->start_time + (0.5 * (double)j) * job->step; }
+static double step_time(const sl_job *job, int64_t k) { return job->start_time + (double)k * job->step; }
 
-/* Uniform signals at half step j: SL_NU values, SL_W doubles apart. */
+/* Instants are counted over all steps: node m of step k is number k SL_INSTANTS + m. */
+static double instant_time(const sl_job *job, int64_t j) {
+  return job->start_time + ((double)(j / SL_INSTANTS) + sl_node[j % SL_INSTANTS]) * job->step;
+}
+
+/* Uniform signals at instant j: SL_NU values, SL_W doubles apart. */
 static const double *uniform_at(sl_clock *clock, int64_t j) {
   const int64_t block = j / SL_BLOCK;
   const int slot = (int)(block & 1), lane = (int)(j % SL_BLOCK);
@@ -65,7 +72,7 @@ static const double *uniform_at(sl_clock *clock, int64_t j) {
     for (part = 0; part < SL_BLOCK / SL_W; part++) {
       double t[SL_W], d[SL_W * (SL_ND + 1)] = {0.0}; /* without tables nothing reads d */
       for (i = 0; i < SL_W; i++) {
-        t[i] = half_step_time(clock->job, block * SL_BLOCK + part * SL_W + i);
+        t[i] = instant_time(clock->job, block * SL_BLOCK + part * SL_W + i);
         table_data(clock->job->tables, t[i], d + i, SL_W);
       }
       kernel_uniform(t, d, clock->uniform[slot][part]);
@@ -87,8 +94,9 @@ typedef struct {
   sl_group x[SL_NX], u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
   sl_group wished[SL_NJ];          /* u before its limit, which turns infinity and NaN into numbers */
   sl_group at[SL_NX], next[SL_NX]; /* where a stage is evaluated, and the next state as far as it is summed up */
-  sl_time times[3];                /* the beginning, middle and end of the step */
-  sl_group varying[3][SL_NV + 1];  /* what varies at these times, in turn */
+  sl_group kept[SL_KEPT + 1][SL_NX];              /* slopes of the stages that sl_kept names */
+  sl_time times[SL_INSTANTS + 1];                 /* the nodes of the step, and its end */
+  sl_group varying[SL_INSTANTS + 1][SL_NV + 1];   /* what varies at these times, in turn */
   sl_metrics metrics[SL_NJ][SL_G];
   sl_clock *clock;
 } sl_pack;
@@ -105,7 +113,7 @@ static sl_time time_at(sl_pack *pack, int64_t j, sl_group *varying) {
   now.varying = (const sl_group *)varying;
   if (SL_NV > 0) {
     double d[SL_ND + 1] = {0.0}; /* likewise */
-    const double t = half_step_time(pack->job, j);
+    const double t = instant_time(pack->job, j);
     table_data(pack->job->tables, t, d, 1);
     kernel_varying(t, d, now.uniform, (const sl_group *)pack->p, (const sl_group *)pack->r, varying);
   }
@@ -123,7 +131,7 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
     double *row;
     if (!pack->alive[lane] || job->rows[run] >= job->capacity) continue;
     row = job->trajectory + (run * job->capacity + job->rows[run]++) * SL_NCOLUMNS;
-    *row++ = half_step_time(job, 2 * k);
+    *row++ = step_time(job, k);
     for (i = 0; i < SL_NX; i++) *row++ = lane_of(pack->x[i], lane);
     for (i = 0; i < SL_NJ; i++) *row++ = lane_of(q1d[i], lane);
     for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->e[i], lane);
@@ -137,7 +145,7 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
 static void finish_lane(sl_pack *pack, int lane, int64_t k, enum sl_status status, int quantity) {
   const sl_job *job = pack->job;
   const int64_t run = pack->run[lane];
-  const double end = half_step_time(job, 2 * k), half = (double)(job->steps - job->steps / 2) * job->step;
+  const double end = step_time(job, k), half = (double)(job->steps - job->steps / 2) * job->step;
   int i;
   for (i = 0; i < SL_NX; i++) job->final_state[run * SL_NX + i] = lane_of(pack->x[i], lane);
   for (i = 0; i < SL_NJ; i++) {
@@ -204,7 +212,7 @@ SL_RARE void stop_overflows(sl_pack *pack, int64_t k, sl_time now) {
 static void observe(sl_pack *pack, int64_t k, sl_time now) {
   const sl_job *job = pack->job;
   const int64_t middle = job->steps / 2;
-  const sl_instant instant = {half_step_time(job, 2 * k), k > 0 ? job->step : 0.0, (k >= middle) + (k > middle),
+  const sl_instant instant = {step_time(job, k), k > 0 ? job->step : 0.0, (k >= middle) + (k > middle),
                               4 * k >= 3 * job->steps};
   int i, g;
   for (i = 0; k == 0 && i < SL_NJ; i++) {
@@ -223,35 +231,24 @@ static void observe(sl_pack *pack, int64_t k, sl_time now) {
   if (job->output_every > 0 && (k % job->output_every == 0 || k == job->steps)) write_row(pack, k, now, 0, pack->lanes);
 }
 
-/* A stage of a classical Runge-Kutta step, from x into next; e, sigma and u become those at the start of the step. */
-static void stage_rk4(sl_pack *pack, int64_t k, int stage) {
-  static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
-  static const int when[4] = {0, 1, 1, 2};
-  const double h = pack->job->step;
-  const sl_v gain = slv_set(weight[stage] * h), advance = slv_set(stage < 3 ? node[stage + 1] * h : 0.0);
+/* A stage of a step, from x into next; e, sigma and u become those at the start of the step. */
+static void run_stage(sl_pack *pack, int64_t k, int stage) {
   const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
   const sl_group *at = stage == 0 ? x : (const sl_group *)pack->at;
-  const sl_group *sum = stage == 0 ? x : (const sl_group *)pack->next;
-  sl_group slope[SL_NX];
-  int i, g;
+  sl_group once[SL_NX], *slope = sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]];
 #if SL_SAMPLED
   (void)k;
-  kernel_plant(pack->times[when[stage]], at, (const sl_group *)pack->u, p, r, slope);
+  kernel_plant(pack->times[sl_when[stage]], at, (const sl_group *)pack->u, p, r, slope);
 #else
   if (stage == 0) {
     kernel_closed(pack->times[0], at, p, r, slope, pack->u, pack->e, pack->sigma, pack->wished);
     observe(pack, k, pack->times[0]);
   } else {
     sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ], wished[SL_NJ];
-    kernel_closed(pack->times[when[stage]], at, p, r, slope, u, e, sigma, wished);
+    kernel_closed(pack->times[sl_when[stage]], at, p, r, slope, u, e, sigma, wished);
   }
 #endif
-  for (i = 0; i < SL_NX; i++) {
-    for (g = 0; g < SL_G; g++) {
-      pack->next[i][g] = sum[i][g] + gain * slope[i][g];
-      pack->at[i][g] = x[i][g] + advance * slope[i][g];
-    }
-  }
+  kernel_update(stage, pack->job->step, x, slope, pack->kept, pack->next, pack->at);
 }
 
 #if SL_SAMPLED
@@ -296,7 +293,7 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
   table_data(job->tables, job->start_time, d, 1);
   kernel_start(job->start_time, d, (const sl_group *)pack->p, (const sl_group *)pack->r, pack->x);
   pack->times[0].varying = (const sl_group *)pack->varying[0];
-  pack->times[2] = time_at(pack, 0, pack->varying[2]);
+  pack->times[SL_INSTANTS] = time_at(pack, 0, pack->varying[SL_INSTANTS]);
 }
 
 static int within(const sl_group *x, double bound) {
@@ -312,9 +309,10 @@ static int within(const sl_group *x, double bound) {
 /* What was the end of a step becomes the beginning of step k; its control and what is observed of it. */
 static void begin_step(sl_pack *pack, int64_t k) {
   sl_group *free = (sl_group *)pack->times[0].varying;
-  pack->times[0] = pack->times[2];
-  pack->times[1] = time_at(pack, 2 * k + 1, pack->varying[1]);
-  pack->times[2] = time_at(pack, 2 * k + 2, free);
+  int m;
+  pack->times[0] = pack->times[SL_INSTANTS];
+  for (m = 1; m < SL_INSTANTS; m++) pack->times[m] = time_at(pack, k * SL_INSTANTS + m, pack->varying[m]);
+  pack->times[SL_INSTANTS] = time_at(pack, (k + 1) * SL_INSTANTS, free);
 #if SL_SAMPLED
   sample_control(pack, k, pack->times[0]);
   observe(pack, k, pack->times[0]);
@@ -330,8 +328,8 @@ static void end_step(sl_pack *pack, int64_t k, double bound) {
 static void end_runs(sl_pack *pack, int64_t k) {
   const enum sl_status status = k == pack->job->steps ? SL_OK : SL_STOPPED;
   int lane;
-  control_at_end(pack, k, pack->times[2]);
-  observe(pack, k, pack->times[2]);
+  control_at_end(pack, k, pack->times[SL_INSTANTS]);
+  observe(pack, k, pack->times[SL_INSTANTS]);
   for (lane = 0; lane < pack->lanes; lane++) {
     if (pack->alive[lane]) finish_lane(pack, lane, k, status, -1);
   }
@@ -348,9 +346,9 @@ static void run_packs(sl_pack *packs, int count, const sl_job *job) {
       if (packs[i].live > 0) begin_step(&packs[i], k);
     }
 #pragma GCC unroll 1
-    for (stage = 0; stage < 4; stage++) {
+    for (stage = 0; stage < SL_STAGES; stage++) {
       for (i = 0; i < count; i++) {
-        if (packs[i].live > 0) stage_rk4(&packs[i], k, stage);
+        if (packs[i].live > 0) run_stage(&packs[i], k, stage);
       }
     }
     for (i = live = 0; i < count; i++) {
