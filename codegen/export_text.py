@@ -5,6 +5,7 @@ A placeholder is {{name}}. The templates say "springline" where the export's pre
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
 from collections.abc import Mapping
@@ -83,9 +84,8 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
     single, structures = export.real == "float", interface.structures
     n = export.system.n
 
-    def filled(*names: str) -> str:
-        members = [(name, field.name) for name in names for field in structures[name]]
-        places = [f"{'base[0]' if name == 'base' else name}.{field}" for name, field in members]
+    def filled(**owners: str) -> str:
+        places = [f"{owner}{field.name}" for name, owner in owners.items() for field in structures[name]]
         return "\n".join(f"  {place} = in[{k}];" for k, place in enumerate(places))
 
     def taken(places: list[str]) -> str:
@@ -98,7 +98,16 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
     measured = [field.name for field in structures["measurement"]]
     tunable = export.tunable_slots
     call = [f"  {export.real} x[{len(states)}] = {{{literal(0.0, export.real)}}};"]
+    bad_parameter = []
     if tunable:
+        bad_parameter = [
+            f"  config.parameters.{tunable[0].symbol} = {literal(math.nan, export.real)};",
+            "  config.fallback = SPRINGLINE_FALLBACK_ZERO;",
+            "  if (springline_set_parameters(controller, &config) != SPRINGLINE_BAD_PARAMETER) {",
+            '    printf("self_check: springline_set_parameters took a parameter that is not a number\\n");',
+            "    return 1;",
+            "  }\n",
+        ]
         members = [f"springline_default_config.parameters.{slot.symbol}" for slot in tunable]
         call += [f"  {export.real} p[{len(tunable)}];"]
     pointers = [f"in + {k * n}" for k in range(3)] + ["x"] + (["p"] if tunable else [])
@@ -117,12 +126,18 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "strto": "strtof" if single else "strtod",
         "control_in": str(3 * n + len(measured)),
         "control_out": str(len(outputs)),
+        "command_out": str(n),
+        "command_to_vector": taken([f"command.{name}" for name in outputs[:n]]),
+        "first_measurement": measured[0],
+        "zero": literal(0.0, export.real),
+        "NAN": literal(math.nan, export.real),
+        "bad_parameter": "\n".join(bad_parameter),
         "control_output_names": ", ".join(f'"{name}"' for name in outputs),
         "plant_in": str(len(structures["base"]) + len(states) + n),
         "plant_out": str(len(states)),
         "plant_output_names": ", ".join(f'"{name}"' for name in states),
         "plant_time_step": literal(TIME_STEP, export.real),
-        "control_from_vector": filled("reference", "measurement"),
+        "control_from_vector": filled(reference="reference->", measurement="measurement->"),
         "control_to_vector": taken(
             [
                 f"command.{name}" if name.startswith("U_") and k < n else f"diagnostics.{name}"
@@ -130,7 +145,7 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
             ]
         ),
         "model_call": "\n".join(call),
-        "plant_from_vector": filled("base", "state", "command"),
+        "plant_from_vector": filled(base="base[0].", state="state.", command="command."),
         "plant_to_vector": taken([f"state.{name}" for name in states]),
     }
 
@@ -149,7 +164,8 @@ def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "status_table": "\n".join(
             f"| `SPRINGLINE_{name}` | {value} | {text} |" for value, (name, text) in enumerate(STATUS)
         ),
-        "parameters_text": "The tunable ones are set through `springline_config`, checked by `springline_init`."
+        "parameters_text": "The tunable ones are set through `springline_config`, checked by `springline_init`\n"
+        "and, while it runs, by `springline_set_parameters`."
         if tunable
         else "All are constants of the C.",
         "parameter_table": "\n".join(

@@ -15,7 +15,7 @@ STATUS = (
     ("NULL_ARGUMENT", "a pointer was NULL that may not be: pass the structures that springline.h names"),
     ("NOT_INITIALIZED", "the controller is not ready: call springline_init first and check what it returns"),
     ("BAD_FALLBACK", "config.fallback is neither SPRINGLINE_FALLBACK_ZERO nor SPRINGLINE_FALLBACK_LAST: set it"),
-    ("BAD_PARAMETER", "a parameter is out of its range (springline.h): correct it and call springline_init again"),
+    ("BAD_PARAMETER", "a parameter is out of its range (springline.h): correct it and pass the configuration again"),
     ("BAD_REFERENCE", "a reference is not a finite number: check the trajectory generator; the fallback is commanded"),
     ("BAD_MEASUREMENT", "a measurement is not a finite number: check the sensors; the fallback is commanded"),
     ("OVERFLOW", "the law left the finite numbers: set a_max or check the reference; the fallback is commanded"),
@@ -111,7 +111,7 @@ class TypedInterface:
 
     @property
     def derive(self) -> Body:
-        """What springline_init computes from the parameters."""
+        """What springline_init and springline_set_parameters compute from the parameters."""
         symbols = [slot.symbol for slot in self.export.tunable_slots]
         return self._printer.derive(lambda _, k: f"parameters->{symbols[k]}", "derived")
 
@@ -190,9 +190,13 @@ class TypedInterface:
             "derive": "\n".join(["/* What depends on parameters only. */", signature + "\n".join(derive), "}", "", ""])
             if derived
             else "",
-            "init_derived": f"  derive({argument}controller->derived);\n" if derived else "",
+            "take_derived": f"  derive({argument}controller->derived);\n" if derived else "",
+            "what_may_change": "Parameters and fallback may change."
+            if tunable
+            else "All parameters are constants here,\n"
+            " * so only the fallback can change (--tunable NAMES makes parameters that can).",
             "parameters_check": self._parameters_check(),
-            "init_parameters": "  if (!parameters_are_good(&config->parameters)) return SPRINGLINE_BAD_PARAMETER;\n"
+            "judge_parameters": "  if (!parameters_are_good(&config->parameters)) return SPRINGLINE_BAD_PARAMETER;\n"
             if tunable
             else "",
         }

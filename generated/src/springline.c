@@ -385,18 +385,46 @@ static int state_is_finite(const real *x) {
 
 static int is_ready(const springline_controller *controller) { return controller->ready == READY; }
 
-/* ---- the interface ----------------------------------------------------------------------------------------- */
-
-int springline_init(springline_controller *controller, const springline_config *config) {
-  if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  controller->ready = 0;
-  controller->last = no_command;
+/* What is wrong with a configuration, before anything of it is taken. */
+static int judge(const springline_config *config) {
   if (config == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (config->fallback != SPRINGLINE_FALLBACK_ZERO && config->fallback != SPRINGLINE_FALLBACK_LAST) {
     return SPRINGLINE_BAD_FALLBACK;
   }
+  return SPRINGLINE_OK;
+}
+
+static void take(springline_controller *controller, const springline_config *config) {
   controller->config = *config;
+}
+
+/* ---- the interface ----------------------------------------------------------------------------------------- */
+
+int springline_init(springline_controller *controller, const springline_config *config) {
+  int status;
+  if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  controller->ready = 0; /* what was there before may be anything, so a refusal leaves nothing of it */
+  controller->last = no_command;
+  status = judge(config);
+  if (status != SPRINGLINE_OK) return status;
+  take(controller, config);
   controller->ready = READY;
+  return SPRINGLINE_OK;
+}
+
+int springline_set_parameters(springline_controller *controller, const springline_config *config) {
+  int status;
+  if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  status = judge(config);
+  if (status == SPRINGLINE_OK) take(controller, config);
+  return status;
+}
+
+int springline_reset(springline_controller *controller) {
+  if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  controller->last = no_command;
   return SPRINGLINE_OK;
 }
 
@@ -539,7 +567,7 @@ const char *springline_status_text(int status) {
     case SPRINGLINE_NULL_ARGUMENT: return "a pointer was NULL that may not be: pass the structures that springline.h names";
     case SPRINGLINE_NOT_INITIALIZED: return "the controller is not ready: call springline_init first and check what it returns";
     case SPRINGLINE_BAD_FALLBACK: return "config.fallback is neither SPRINGLINE_FALLBACK_ZERO nor SPRINGLINE_FALLBACK_LAST: set it";
-    case SPRINGLINE_BAD_PARAMETER: return "a parameter is out of its range (springline.h): correct it and call springline_init again";
+    case SPRINGLINE_BAD_PARAMETER: return "a parameter is out of its range (springline.h): correct it and pass the configuration again";
     case SPRINGLINE_BAD_REFERENCE: return "a reference is not a finite number: check the trajectory generator; the fallback is commanded";
     case SPRINGLINE_BAD_MEASUREMENT: return "a measurement is not a finite number: check the sensors; the fallback is commanded";
     case SPRINGLINE_OVERFLOW: return "the law left the finite numbers: set a_max or check the reference; the fallback is commanded";

@@ -64,18 +64,46 @@ static int state_is_finite(const real *x) {
 
 {{parameters_check}}static int is_ready(const springline_controller *controller) { return controller->ready == READY; }
 
-/* ---- the interface ----------------------------------------------------------------------------------------- */
-
-int springline_init(springline_controller *controller, const springline_config *config) {
-  if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  controller->ready = 0;
-  controller->last = no_command;
+/* What is wrong with a configuration, before anything of it is taken. */
+static int judge(const springline_config *config) {
   if (config == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (config->fallback != SPRINGLINE_FALLBACK_ZERO && config->fallback != SPRINGLINE_FALLBACK_LAST) {
     return SPRINGLINE_BAD_FALLBACK;
   }
-{{init_parameters}}  controller->config = *config;
-{{init_derived}}  controller->ready = READY;
+{{judge_parameters}}  return SPRINGLINE_OK;
+}
+
+static void take(springline_controller *controller, const springline_config *config) {
+  controller->config = *config;
+{{take_derived}}}
+
+/* ---- the interface ----------------------------------------------------------------------------------------- */
+
+int springline_init(springline_controller *controller, const springline_config *config) {
+  int status;
+  if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  controller->ready = 0; /* what was there before may be anything, so a refusal leaves nothing of it */
+  controller->last = no_command;
+  status = judge(config);
+  if (status != SPRINGLINE_OK) return status;
+  take(controller, config);
+  controller->ready = READY;
+  return SPRINGLINE_OK;
+}
+
+int springline_set_parameters(springline_controller *controller, const springline_config *config) {
+  int status;
+  if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  status = judge(config);
+  if (status == SPRINGLINE_OK) take(controller, config);
+  return status;
+}
+
+int springline_reset(springline_controller *controller) {
+  if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  controller->last = no_command;
   return SPRINGLINE_OK;
 }
 

@@ -62,8 +62,20 @@ typedef struct springline_controller {
   int ready;
 } springline_controller;
 
-/* Prepares a controller. If it fails the controller commands zero force. */
+/*
+ * Prepares a controller, at start-up: whatever the memory held before is forgotten. If it fails the controller is not
+ * ready and commands zero force; a controller that runs already is retuned by springline_set_parameters instead.
+ */
 int springline_init(springline_controller *controller, const springline_config *config);
+
+/*
+ * Retunes a running controller between two steps: all of *config is checked, then taken. {{what_may_change}}
+ * The last command is kept. If it fails nothing has changed, and the controller goes on as it was.
+ */
+int springline_set_parameters(springline_controller *controller, const springline_config *config);
+
+/* Forgets the past of a controller, not its configuration: the last command is zero, as after springline_init. */
+int springline_reset(springline_controller *controller);
 
 /*
  * Computes the command for one sample. The law keeps no state from step to step, so any sample rate will do; for the
