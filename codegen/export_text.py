@@ -5,6 +5,7 @@ A placeholder is {{name}}. The templates say "springline" where the export's pre
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
 from collections.abc import Mapping
@@ -14,7 +15,7 @@ from importlib.metadata import version
 from springline.codegen.export import Export, comment, provenance
 from springline.codegen.scalar import literal
 from springline.codegen.typed import STATUS, TypedInterface
-from springline.codegen.vectors import TIME_STEP
+from springline.codegen.vectors import TIME_STEP, control_outputs
 
 
 def text_files(export: Export, interface: TypedInterface) -> dict[str, bytes]:
@@ -68,9 +69,11 @@ def _main_blocks(interface: TypedInterface) -> dict[str, str]:
     joints = [joint.name for joint in interface.export.system.joints]
     columns = [("state", "q1"), ("reference", "q1d"), ("command", "U")]
     shown = [(owner, f"{quantity}_{joint}") for owner, quantity in columns for joint in joints]
+    missing = interface.missing_tables.replace("zero here", "main runs with zero")
     digits = "9" if interface.export.real == "float" else "17"
     return {
         "digits": digits,
+        "table_warning": f'  fprintf(stderr, "main: {missing}\\n");\n' if missing else "",
         "csv_header": ",".join(["t", *(name for _, name in shown)]),
         "print_fields": "\n".join(f'  printf(",%.{digits}g", (double){owner}->{name});' for owner, name in shown),
         "measure": "\n".join(
@@ -83,22 +86,29 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
     single, structures = export.real == "float", interface.structures
     n = export.system.n
 
-    def filled(*names: str) -> str:
-        members = [(name, field.name) for name in names for field in structures[name]]
-        places = [f"{'base[0]' if name == 'base' else name}.{field}" for name, field in members]
+    def filled(**owners: str) -> str:
+        places = [f"{owner}{field.name}" for name, owner in owners.items() for field in structures[name]]
         return "\n".join(f"  {place} = in[{k}];" for k, place in enumerate(places))
 
     def taken(places: list[str]) -> str:
         return "\n".join(f"  got[{k}] = {place};" for k, place in enumerate(places))
 
-    outputs = [
-        f"{quantity}_{joint.name}" for quantity in ("U", "U_s", "U_f", "e", "sigma") for joint in export.system.joints
-    ]
+    outputs = control_outputs(export)
+    of_diagnostics = {field.name: field for field in structures["diagnostics"]}
     states = [field.name for field in structures["state"]]
     measured = [field.name for field in structures["measurement"]]
     tunable = export.tunable_slots
     call = [f"  {export.real} x[{len(states)}] = {{{literal(0.0, export.real)}}};"]
+    bad_parameter = []
     if tunable:
+        bad_parameter = [
+            f"  config.parameters.{tunable[0].symbol} = {literal(math.nan, export.real)};",
+            "  config.fallback = SPRINGLINE_FALLBACK_ZERO;",
+            "  if (springline_set_parameters(controller, &config) != SPRINGLINE_BAD_PARAMETER) {",
+            '    printf("self_check: springline_set_parameters took a parameter that is not a number\\n");',
+            "    return 1;",
+            "  }\n",
+        ]
         members = [f"springline_default_config.parameters.{slot.symbol}" for slot in tunable]
         call += [f"  {export.real} p[{len(tunable)}];"]
     pointers = [f"in + {k * n}" for k in range(3)] + ["x"] + (["p"] if tunable else [])
@@ -117,20 +127,29 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "strto": "strtof" if single else "strtod",
         "control_in": str(3 * n + len(measured)),
         "control_out": str(len(outputs)),
+        "command_out": str(n),
+        "model_out": str(5 * n),
+        "command_to_vector": taken([f"command.{name}" for name in outputs[:n]]),
+        "first_measurement": measured[0],
+        "zero": literal(0.0, export.real),
+        "NAN": literal(math.nan, export.real),
+        "bad_parameter": "\n".join(bad_parameter),
         "control_output_names": ", ".join(f'"{name}"' for name in outputs),
         "plant_in": str(len(structures["base"]) + len(states) + n),
         "plant_out": str(len(states)),
         "plant_output_names": ", ".join(f'"{name}"' for name in states),
         "plant_time_step": literal(TIME_STEP, export.real),
-        "control_from_vector": filled("reference", "measurement"),
+        "control_from_vector": filled(reference="reference->", measurement="measurement->"),
         "control_to_vector": taken(
             [
-                f"command.{name}" if name.startswith("U_") and k < n else f"diagnostics.{name}"
-                for k, name in enumerate(outputs)
+                f"command.{name}"
+                if name not in of_diagnostics
+                else f"{'(springline_real)' if of_diagnostics[name].integer else ''}diagnostics.{name}"
+                for name in outputs
             ]
         ),
         "model_call": "\n".join(call),
-        "plant_from_vector": filled("base", "state", "command"),
+        "plant_from_vector": filled(base="base[0].", state="state.", command="command."),
         "plant_to_vector": taken([f"state.{name}" for name in states]),
     }
 
@@ -140,6 +159,12 @@ def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
     single = export.real == "float"
     cost = {"springline_step": "control", "one evaluation of the plant, of four in springline_plant_step": "plant"}
     return {
+        "table_note": (
+            f"{interface.missing_tables.removesuffix('.')}, in `{export.prefix}_signals` and so in what `main.c` runs "
+            "with. Put signals of your own in its place."
+            if interface.missing_tables
+            else f"`{export.prefix}_signals` has the scenario's reference and base motion."
+        ),
         "provenance": "  \n".join(provenance(export)),
         "field_table": "\n".join(
             f"| `springline_{name}` | `{field.name}` | {field.unit} |"
@@ -149,7 +174,8 @@ def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "status_table": "\n".join(
             f"| `SPRINGLINE_{name}` | {value} | {text} |" for value, (name, text) in enumerate(STATUS)
         ),
-        "parameters_text": "The tunable ones are set through `springline_config`, checked by `springline_init`."
+        "parameters_text": "The tunable ones are set through `springline_config`, checked by `springline_init`\n"
+        "and, while it runs, by `springline_set_parameters`."
         if tunable
         else "All are constants of the C.",
         "parameter_table": "\n".join(

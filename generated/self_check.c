@@ -4,7 +4,8 @@
  */
 /*
  * Replays test_vectors.txt: every output must have the bits that are written there. A build that fails this has been
- * compiled with flags that change arithmetic, and does not compute what was tested.
+ * compiled with flags that change arithmetic, and does not compute what was tested. Retunes and resets a running
+ * controller too.
  * Usage: self_check [test_vectors.txt]
  */
 #include <stdint.h>
@@ -14,12 +15,14 @@
 
 #include "springline.h"
 #include "springline_model.h"
+#include "sl_math.h"
 
 typedef uint64_t bits;
 
-enum { CONTROL_IN = 12, CONTROL_OUT = 10, PLANT_IN = 19, PLANT_OUT = 8, LINE = 4096 };
+enum { CONTROL_IN = 12, CONTROL_OUT = 14, COMMAND_OUT = 2, MODEL_OUT = 10,
+       PLANT_IN = 19, PLANT_OUT = 8, LINE = 4096 };
 
-static const char *const control_outputs[CONTROL_OUT] = { "U_lift", "U_rotation", "U_s_lift", "U_s_rotation", "U_f_lift", "U_f_rotation", "e_lift", "e_rotation", "sigma_lift", "sigma_rotation" };
+static const char *const control_outputs[CONTROL_OUT] = { "U_lift", "U_rotation", "U_s_lift", "U_s_rotation", "U_f_lift", "U_f_rotation", "e_lift", "e_rotation", "sigma_lift", "sigma_rotation", "saturated_lift", "saturated_rotation", "a_limited_lift", "a_limited_rotation" };
 static const char *const plant_outputs[PLANT_OUT] = { "q1_lift", "q1_rotation", "dq1_lift", "dq1_rotation", "q2_lift", "q2_rotation", "dq2_lift", "dq2_rotation" };
 static const springline_real plant_time_step = 0.0001;
 
@@ -44,6 +47,22 @@ static int differs(const char *what, long line, const char *const *names, int co
   return 0;
 }
 
+static void read_control(const springline_real *in, springline_reference *reference,
+                         springline_measurement *measurement) {
+  reference->q1d_lift = in[0];
+  reference->q1d_rotation = in[1];
+  reference->dq1d_lift = in[2];
+  reference->dq1d_rotation = in[3];
+  reference->ddq1d_lift = in[4];
+  reference->ddq1d_rotation = in[5];
+  measurement->q1_lift = in[6];
+  measurement->q1_rotation = in[7];
+  measurement->dq1_lift = in[8];
+  measurement->dq1_rotation = in[9];
+  measurement->dq2_lift = in[10];
+  measurement->dq2_rotation = in[11];
+}
+
 static int replay_control(springline_controller *controller, long line, const springline_real *in,
                           const springline_real *expected) {
   springline_reference reference;
@@ -52,18 +71,7 @@ static int replay_control(springline_controller *controller, long line, const sp
   springline_diagnostics diagnostics;
   springline_real got[CONTROL_OUT];
   int status;
-  reference.q1d_lift = in[0];
-  reference.q1d_rotation = in[1];
-  reference.dq1d_lift = in[2];
-  reference.dq1d_rotation = in[3];
-  reference.ddq1d_lift = in[4];
-  reference.ddq1d_rotation = in[5];
-  measurement.q1_lift = in[6];
-  measurement.q1_rotation = in[7];
-  measurement.dq1_lift = in[8];
-  measurement.dq1_rotation = in[9];
-  measurement.dq2_lift = in[10];
-  measurement.dq2_rotation = in[11];
+  read_control(in, &reference, &measurement);
   status = springline_step(controller, &reference, &measurement, &command, &diagnostics);
   if (status != SPRINGLINE_OK) {
     printf("line %ld: springline_step: %s\n", line, springline_status_text(status));
@@ -79,12 +87,59 @@ static int replay_control(springline_controller *controller, long line, const sp
   got[7] = diagnostics.e_rotation;
   got[8] = diagnostics.sigma_lift;
   got[9] = diagnostics.sigma_rotation;
+  got[10] = (springline_real)diagnostics.saturated_lift;
+  got[11] = (springline_real)diagnostics.saturated_rotation;
+  got[12] = (springline_real)diagnostics.a_limited_lift;
+  got[13] = (springline_real)diagnostics.a_limited_rotation;
   return differs("springline_step", line, control_outputs, CONTROL_OUT, expected, got);
+}
+
+/* A sensor is out: the fallback has to be the first outputs of `expected`, or zero where it is NULL. */
+static int replay_fault(springline_controller *controller, long line, const springline_real *in,
+                        const springline_real *expected) {
+  static const springline_real zero[COMMAND_OUT] = {0.0};
+  springline_reference reference;
+  springline_measurement measurement;
+  springline_command command;
+  springline_real got[COMMAND_OUT];
+  read_control(in, &reference, &measurement);
+  measurement.q1_lift = SL_NAN;
+  if (springline_step(controller, &reference, &measurement, &command, NULL) != SPRINGLINE_BAD_MEASUREMENT) {
+    printf("line %ld: springline_step took a measurement that is not a number\n", line);
+    return 1;
+  }
+  got[0] = command.U_lift;
+  got[1] = command.U_rotation;
+  return differs("the fallback of springline_step", line, control_outputs, COMMAND_OUT, expected != NULL ? expected : zero, got);
+}
+
+/* A controller that runs: what is refused changes nothing, what is taken keeps the last command, a reset forgets it. */
+static int replay_retuning(springline_controller *controller, long line, const springline_real *in,
+                           const springline_real *expected) {
+  springline_config config = springline_default_config;
+  if (replay_control(controller, line, in, expected)) return 1;
+  config.fallback = SPRINGLINE_FALLBACK_LAST;
+  if (springline_set_parameters(controller, &config) != SPRINGLINE_OK) {
+    printf("self_check: springline_set_parameters refused the default parameters\n");
+    return 1;
+  }
+  config.fallback = SPRINGLINE_FALLBACK_LAST + 1;
+  if (springline_set_parameters(controller, &config) != SPRINGLINE_BAD_FALLBACK) {
+    printf("self_check: springline_set_parameters took a fallback that there is not\n");
+    return 1;
+  }
+  if (replay_fault(controller, line, in, expected) || replay_control(controller, line, in, expected)) return 1;
+  if (springline_reset(controller) != SPRINGLINE_OK) {
+    printf("self_check: springline_reset refused a controller that runs\n");
+    return 1;
+  }
+  if (replay_fault(controller, line, in, NULL) || replay_control(controller, line, in, expected)) return 1;
+  return springline_set_parameters(controller, &springline_default_config) != SPRINGLINE_OK;
 }
 
 /* The same inputs through the function that CasADi printed. */
 static int replay_model(long line, const springline_real *in, const springline_real *expected) {
-  springline_real got[CONTROL_OUT];
+  springline_real got[MODEL_OUT];
   double x[8] = {0.0};
   const double *arg[4] = {0};
   double *res[5] = {0};
@@ -104,7 +159,7 @@ static int replay_model(long line, const springline_real *in, const springline_r
   res[3] = got + 6;
   res[4] = got + 8;
   if (springline_control(arg, res, 0, 0, 0) != 0) return 1;
-  return differs("springline_control", line, control_outputs, CONTROL_OUT, expected, got);
+  return differs("springline_control", line, control_outputs, MODEL_OUT, expected, got);
 }
 
 static int replay_plant(const springline_controller *controller, long line, const springline_real *in,
@@ -184,6 +239,7 @@ int main(int argc, char **argv) {
       rest = read_numbers(text + 8, in, CONTROL_IN);
       if (rest != NULL) rest = read_numbers(rest, out, CONTROL_OUT);
       if (rest != NULL) failures += replay_control(&controller, line, in, out) | replay_model(line, in, out);
+      if (rest != NULL && controls == 0) failures += replay_retuning(&controller, line, in, out);
       controls++;
     } else if (strncmp(text, "plant ", 6) == 0) {
       rest = read_numbers(text + 6, in, PLANT_IN);

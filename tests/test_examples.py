@@ -79,7 +79,10 @@ def test_cmake_and_pkg_config(tmp_path: Path, require_tool: Callable[..., str]) 
 
 def test_cpp(tmp_path: Path, require_tool: Callable[..., str]) -> None:
     require_tool("c++")
-    last = make("cpp", tmp_path, "run").splitlines()[-1]
+    *before, last = make("cpp", tmp_path, "run").splitlines()
+    retuned = [line for line in before if "t =" not in line]
+    assert retuned[0] == "retuned: done"
+    assert retuned[1].startswith("refused, and nothing changed: config.fallback is neither")
     time, lift, rotation = numbers(last)
     assert time == 1.0
     assert abs(lift) < 1e-3

@@ -13,6 +13,14 @@ class Controller {
     check(springline_init(&controller_, &config));
   }
 
+  // Between two steps; a configuration that is refused is not taken, and the controller goes on as it was.
+  [[nodiscard]] int retune(const springline_config &config) noexcept {
+    return springline_set_parameters(&controller_, &config);
+  }
+
+  // A new task: the last command is forgotten, the configuration stays.
+  void reset() { check(springline_reset(&controller_)); }
+
   // A fault is the caller's to judge, so it is returned, with the fallback in the command.
   [[nodiscard]] int step(const springline_reference &reference, const springline_measurement &measurement,
                          springline_command &command) noexcept {
@@ -49,6 +57,7 @@ class Controller {
 
 int main() try {
   Controller controller;
+  springline_config config = springline_default_config;
   springline_state arm = controller.start();
   springline_command command{};
   const std::array<springline_base, 3> rolling_deck = [] {
@@ -57,6 +66,14 @@ int main() try {
     return std::array{base, base, base};
   }();
   for (int k = 0; k <= 1000; k++) {
+    if (k == 300) {
+      // On the way: an export with --tunable has its numbers here too, config.parameters.control_mu_lift and so on.
+      config.fallback = SPRINGLINE_FALLBACK_LAST;
+      std::printf("retuned: %s\n", springline_status_text(controller.retune(config)));
+      springline_config wrong = config;
+      wrong.fallback = 7;
+      std::printf("refused, and nothing changed: %s\n", springline_status_text(controller.retune(wrong)));
+    }
     const springline_reference wanted = controller.reference(1e-3 * k);
     const springline_measurement measured{arm.q1_lift,      arm.q1_rotation, arm.dq1_lift,
                                           arm.dq1_rotation, arm.dq2_lift,    arm.dq2_rotation};
@@ -69,6 +86,7 @@ int main() try {
     }
     for (int j = 0; j < 10; j++) controller.advance(arm, command, rolling_deck, 1e-4);
   }
+  controller.reset();
   return 0;
 } catch (const std::exception &error) {
   std::fprintf(stderr, "%s\n", error.what());

@@ -20,6 +20,7 @@ from springline.codegen.export import bind
 from springline.codegen.kernel import KernelOptions, LoopSettings, kernel
 from springline.codegen.manifest import write_tree
 from springline.codegen.typed import STATUS
+from springline.model.parameters import Slot
 from springline.runner import load_scenario
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
@@ -368,6 +369,125 @@ def test_parameters_are_checked(library: Callable[[str], Library]) -> None:
         assert case.status == "BAD_PARAMETER", (name, bad)
         assert case.step() == "NOT_INITIALIZED"
         assert values(case.command) == [0.0, 0.0]
+
+
+# --- retuning while it runs ------------------------------------------------------------------------------------
+
+
+def copy(structure: Any) -> Any:
+    return type(structure).from_buffer_copy(structure)
+
+
+def other(slot: Slot, value: float) -> float:
+    """An admissible value that is not `value`."""
+    candidates = (1.25 * value, 0.75 * value, value + 0.5, 0.5, 2.0, 4.0)
+    return next(x for x in candidates if x != value and slot.bounds.holds(x))
+
+
+@pytest.mark.parametrize("name", ["baked", "all", "single_tunable"])
+def test_a_retuning_that_is_refused_changes_nothing(name: str, library: Callable[[str], Library]) -> None:
+    """One value of many is bad: none is taken, and the next command is as if nobody had asked."""
+    lib = library(name)
+    case = Case(lib, fallback=1)
+    assert case.step() == "OK"
+    command, before = values(case.command), bytes(case.controller)
+    wrong: list[tuple[Any, str]] = [(None, "NULL_ARGUMENT")]
+    for fallback in (-1, 2, 2**16):
+        config = copy(case.controller.config)
+        config.fallback = fallback
+        wrong.append((config, "BAD_FALLBACK"))
+    if name != "baked":
+        slots = load_scenario("paper/nominal").system().slots
+        for bad in slots:
+            for number in (math.nan, -math.inf):
+                config = copy(case.controller.config)
+                config.fallback = 0
+                for slot in slots:
+                    setattr(config.parameters, slot.symbol, other(slot, getattr(config.parameters, slot.symbol)))
+                setattr(config.parameters, bad.symbol, number)
+                wrong.append((config, "BAD_PARAMETER"))
+    for config, status in wrong:
+        assert lib("set_parameters", case.controller, config) == status
+        assert bytes(case.controller) == before
+    assert case.step() == "OK"
+    assert values(case.command) == command
+
+
+@pytest.mark.parametrize("name", ["all", "single_tunable"])
+def test_retuning_is_starting_anew_with_the_past_kept(name: str, library: Callable[[str], Library]) -> None:
+    """Whichever parameter changes: control, plant and signals have the bits of a controller that started with it."""
+    lib = library(name)
+    live = Case(lib)
+    differing = 0
+    for slot in load_scenario("paper/nominal").system().slots:
+        value = other(slot, getattr(lib.default().parameters, slot.symbol))
+        fresh = Case(lib, **{slot.symbol: value})
+        live.reference, live.measurement = copy(fresh.reference), copy(fresh.measurement)
+        assert lib("set_parameters", live.controller, lib.default()) == "OK"
+        assert live.step() == "OK"
+        nominal, last = values(live.command), bytes(live.controller.last)
+        config = copy(lib.default())
+        setattr(config.parameters, slot.symbol, value)
+        assert lib("set_parameters", live.controller, config) == "OK"
+        assert bytes(live.controller.last) == last
+        assert live.step() == fresh.step() == "OK"
+        assert bytes(live.command) == bytes(fresh.command), slot.key
+        assert bytes(live.diagnostics) == bytes(fresh.diagnostics), slot.key
+        differing += values(live.command) != nominal
+        states = [copy(fresh.state), copy(fresh.state)]
+        for case, state in zip((live, fresh), states, strict=True):
+            assert lib("start", case.controller, state) == "OK"
+            assert lib("plant_step", case.controller, state, fresh.command, None, 1e-4) == "OK"
+        assert bytes(states[0]) == bytes(states[1]), slot.key
+        signals = [(copy(fresh.reference), lib.new("base")) for _ in range(2)]
+        for case, (reference, base) in zip((live, fresh), signals, strict=True):
+            assert lib("signals", case.controller, 0.3, reference, base) == "OK"
+        assert bytes(signals[0][0]) == bytes(signals[1][0]), slot.key
+    assert differing > 10
+
+
+def test_the_last_command_survives_a_retuning_and_not_a_reset(library: Callable[[str], Library]) -> None:
+    lib = library("tunable")
+    case = Case(lib)
+    assert case.step() == "OK"
+    last = values(case.command)
+    config = copy(case.controller.config)
+    config.fallback, config.parameters.control_mu_lift = 1, 3.0
+    assert lib("set_parameters", case.controller, config) == "OK"
+    kept = case.measurement.q1_lift
+    case.measurement.q1_lift = math.nan
+    assert case.step() == "BAD_MEASUREMENT"
+    assert values(case.command) == last
+    assert lib("set_parameters", case.controller, case.controller.config) == "OK"  # from the controller itself
+    assert lib("reset", case.controller) == "OK"
+    assert bytes(case.controller.config) == bytes(config)
+    assert case.step() == "BAD_MEASUREMENT"
+    assert values(case.command) == [0.0, 0.0]
+    case.measurement.q1_lift = kept
+    tuned = Case(lib, control_mu_lift=3.0)
+    assert case.step() == tuned.step() == "OK"
+    assert values(case.command) == values(tuned.command) != last
+
+
+def test_only_init_makes_a_controller_ready_and_a_refused_one_leaves_none(library: Callable[[str], Library]) -> None:
+    """Init is for start-up: what it refuses commands zero, whatever ran in that memory before."""
+    lib = library("tunable")
+    raw = lib.new("controller")
+    before = bytes(raw)
+    assert lib("set_parameters", raw, lib.default()) == lib("reset", raw) == "NOT_INITIALIZED"
+    assert bytes(raw) == before
+    assert lib("set_parameters", None, lib.default()) == lib("reset", None) == "NULL_ARGUMENT"
+    case = Case(lib, fallback=1)
+    assert case.step() == "OK"
+    config = copy(lib.default())
+    config.parameters.control_k1 = math.nan
+    assert lib("init", case.controller, config) == "BAD_PARAMETER"
+    assert case.step() == "NOT_INITIALIZED"
+    assert values(case.command) == [0.0, 0.0]
+    assert lib("set_parameters", case.controller, lib.default()) == "NOT_INITIALIZED"
+
+
+# --- limits ----------------------------------------------------------------------------------------------------
 
 
 def test_limits_hold_and_are_flagged(library: Callable[[str], Library]) -> None:

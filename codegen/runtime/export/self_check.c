@@ -1,6 +1,7 @@
 /*
  * Replays test_vectors.txt: every output must have the bits that are written there. A build that fails this has been
- * compiled with flags that change arithmetic, and does not compute what was tested.
+ * compiled with flags that change arithmetic, and does not compute what was tested. Retunes and resets a running
+ * controller too.
  * Usage: self_check [test_vectors.txt]
  */
 #include <stdint.h>
@@ -10,10 +11,12 @@
 
 #include "springline.h"
 #include "springline_model.h"
+#include "{{math_header}}"
 
 typedef {{bits_type}} bits;
 
-enum { CONTROL_IN = {{control_in}}, CONTROL_OUT = {{control_out}}, PLANT_IN = {{plant_in}}, PLANT_OUT = {{plant_out}}, LINE = 4096 };
+enum { CONTROL_IN = {{control_in}}, CONTROL_OUT = {{control_out}}, COMMAND_OUT = {{command_out}}, MODEL_OUT = {{model_out}},
+       PLANT_IN = {{plant_in}}, PLANT_OUT = {{plant_out}}, LINE = 4096 };
 
 static const char *const control_outputs[CONTROL_OUT] = { {{control_output_names}} };
 static const char *const plant_outputs[PLANT_OUT] = { {{plant_output_names}} };
@@ -40,6 +43,11 @@ static int differs(const char *what, long line, const char *const *names, int co
   return 0;
 }
 
+static void read_control(const springline_real *in, springline_reference *reference,
+                         springline_measurement *measurement) {
+{{control_from_vector}}
+}
+
 static int replay_control(springline_controller *controller, long line, const springline_real *in,
                           const springline_real *expected) {
   springline_reference reference;
@@ -48,7 +56,7 @@ static int replay_control(springline_controller *controller, long line, const sp
   springline_diagnostics diagnostics;
   springline_real got[CONTROL_OUT];
   int status;
-{{control_from_vector}}
+  read_control(in, &reference, &measurement);
   status = springline_step(controller, &reference, &measurement, &command, &diagnostics);
   if (status != SPRINGLINE_OK) {
     printf("line %ld: springline_step: %s\n", line, springline_status_text(status));
@@ -58,11 +66,53 @@ static int replay_control(springline_controller *controller, long line, const sp
   return differs("springline_step", line, control_outputs, CONTROL_OUT, expected, got);
 }
 
+/* A sensor is out: the fallback has to be the first outputs of `expected`, or zero where it is NULL. */
+static int replay_fault(springline_controller *controller, long line, const springline_real *in,
+                        const springline_real *expected) {
+  static const springline_real zero[COMMAND_OUT] = {{{zero}}};
+  springline_reference reference;
+  springline_measurement measurement;
+  springline_command command;
+  springline_real got[COMMAND_OUT];
+  read_control(in, &reference, &measurement);
+  measurement.{{first_measurement}} = {{NAN}};
+  if (springline_step(controller, &reference, &measurement, &command, NULL) != SPRINGLINE_BAD_MEASUREMENT) {
+    printf("line %ld: springline_step took a measurement that is not a number\n", line);
+    return 1;
+  }
+{{command_to_vector}}
+  return differs("the fallback of springline_step", line, control_outputs, COMMAND_OUT, expected != NULL ? expected : zero, got);
+}
+
+/* A controller that runs: what is refused changes nothing, what is taken keeps the last command, a reset forgets it. */
+static int replay_retuning(springline_controller *controller, long line, const springline_real *in,
+                           const springline_real *expected) {
+  springline_config config = springline_default_config;
+  if (replay_control(controller, line, in, expected)) return 1;
+  config.fallback = SPRINGLINE_FALLBACK_LAST;
+  if (springline_set_parameters(controller, &config) != SPRINGLINE_OK) {
+    printf("self_check: springline_set_parameters refused the default parameters\n");
+    return 1;
+  }
+  config.fallback = SPRINGLINE_FALLBACK_LAST + 1;
+  if (springline_set_parameters(controller, &config) != SPRINGLINE_BAD_FALLBACK) {
+    printf("self_check: springline_set_parameters took a fallback that there is not\n");
+    return 1;
+  }
+{{bad_parameter}}  if (replay_fault(controller, line, in, expected) || replay_control(controller, line, in, expected)) return 1;
+  if (springline_reset(controller) != SPRINGLINE_OK) {
+    printf("self_check: springline_reset refused a controller that runs\n");
+    return 1;
+  }
+  if (replay_fault(controller, line, in, NULL) || replay_control(controller, line, in, expected)) return 1;
+  return springline_set_parameters(controller, &springline_default_config) != SPRINGLINE_OK;
+}
+
 /* The same inputs through the function that CasADi printed. */
 static int replay_model(long line, const springline_real *in, const springline_real *expected) {
-  springline_real got[CONTROL_OUT];
+  springline_real got[MODEL_OUT];
 {{model_call}}
-  return differs("springline_control", line, control_outputs, CONTROL_OUT, expected, got);
+  return differs("springline_control", line, control_outputs, MODEL_OUT, expected, got);
 }
 
 static int replay_plant(const springline_controller *controller, long line, const springline_real *in,
@@ -117,6 +167,7 @@ int main(int argc, char **argv) {
       rest = read_numbers(text + 8, in, CONTROL_IN);
       if (rest != NULL) rest = read_numbers(rest, out, CONTROL_OUT);
       if (rest != NULL) failures += replay_control(&controller, line, in, out) | replay_model(line, in, out);
+      if (rest != NULL && controls == 0) failures += replay_retuning(&controller, line, in, out);
       controls++;
     } else if (strncmp(text, "plant ", 6) == 0) {
       rest = read_numbers(text + 6, in, PLANT_IN);
