@@ -60,7 +60,7 @@ def document(
                 f"<code>{escape(v.name)}</code>",
                 escape("true or false" if v.boolean else v.unit),
                 escape(v.meaning),
-                *([repr(v.start), escape(str(v.bounds)), v.variability] if more else []),
+                *([repr(v.start), escape(v.expected), v.variability] if more else []),
             ]
             for v in chosen
         ]
