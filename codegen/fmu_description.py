@@ -82,7 +82,9 @@ def model_description(
     ET.SubElement(
         categories, "Category", {"name": "logStatusError", "description": "what was refused or went wrong, and why"}
     )
-    step = settings.period or settings.step
+    # Controller and plant may meet in a master that exchanges values after the step, and so delays the command by it:
+    # the sample period is often too long for that.
+    step = (settings.period or settings.step) if interface.part == "loop" else settings.step
     experiment = {"startTime": "0.0", "stopTime": repr(settings.duration), "stepSize": repr(step)}
     ET.SubElement(root, "DefaultExperiment", experiment)
     variables = ET.SubElement(root, "ModelVariables")
