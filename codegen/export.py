@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from springline.codegen.manifest import canonical_json
 from springline.codegen.names import check_prefix
 from springline.codegen.program import count_operations
-from springline.model.base import COORDINATES
+from springline.codegen.tables import Table
 from springline.model.parameters import Slot
+from springline.model.quantities import BASE, DDQ1, DERIVATIVES, REFERENCE, SIGMA, E, Quantity, T, entries
 from springline.model.sliding import LAWS
 from springline.model.system import Structure, System
 
@@ -59,6 +60,7 @@ class Export:
     tunable  indices of the slots that stay arguments, ascending
     prefix   of every public name
     real     number type of the C
+    tables   data of the system's table signals, in the order of System.tables; () leaves them out, they are zero then
     """
 
     system: System
@@ -66,6 +68,7 @@ class Export:
     tunable: tuple[int, ...]
     prefix: str = "springline"
     real: Real = "double"
+    tables: tuple[Table, ...] = ()
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -87,8 +90,8 @@ class Export:
         return self.values[[slot.key for slot in self.slots].index(key)]
 
     def model_functions(self) -> Iterator[tuple[str, ca.Function]]:
-        """Public name and frozen Function (last input p: all slots) of everything in MODEL_FUNCTIONS."""
-        for name in MODEL_FUNCTIONS:
+        """Public name and frozen Function (last input p: all slots) of everything in MODEL_FUNCTIONS that it has."""
+        for name in (name for name in MODEL_FUNCTIONS if name in self.system.functions):
             yield f"{self.prefix}_{name}", self.system.function(name)
 
     def inputs(self, function: ca.Function) -> list[Port]:
@@ -124,6 +127,10 @@ class Export:
             "tunable": [slot.key for slot in self.tunable_slots],
             "prefix": self.prefix,
             "real": self.real,
+            "tables": [
+                [table.t0, table.dt, table.periodic, hashlib.sha256(table.coefficients.tobytes()).hexdigest()]
+                for table in self.tables
+            ],
         }
         return hashlib.sha256(canonical_json(identity)).hexdigest()
 
@@ -132,36 +139,25 @@ def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
     """Name and SI unit of each entry, column by column, of every input and output that a System's Functions have."""
     joints = system.joints
 
-    def coordinate(quantity: str, suffix: str = "") -> list[tuple[str, str]]:
-        return [(f"{quantity}_{j.name}", j.unit + suffix) for j in joints]
+    def of(*declared: Quantity) -> list[tuple[str, str]]:
+        return [(entry.name, entry.unit) for entry in entries(declared, joints)]
 
-    def force(quantity: str, suffix: str = "") -> list[tuple[str, str]]:
-        return [(f"{quantity}_{j.name}", j.force + suffix) for j in joints]
+    def force(name: str, suffix: str = "") -> list[tuple[str, str]]:
+        return [(f"{name}_{j.name}", j.force + suffix) for j in joints]
 
-    def base(derivative: str, suffix: str) -> list[tuple[str, str]]:
-        return [(f"{derivative}{c.symbol}", c.unit + suffix) for c in COORDINATES]
-
-    rates = {quantity: coordinate(quantity, "/s") for quantity in ("dq1", "dq2", "dq1d", "sigma")}
-    accelerations = {q: coordinate(q, "/s^2") for q in ("ddq1", "ddq2", "ddq1d", "dsigma")}
-    positions = {quantity: coordinate(quantity) for quantity in ("q1", "q2", "q1d", "e")}
+    state = of(*system.drive.state)
     return {
-        **positions,
-        **rates,
-        **accelerations,
+        **{item.name: of(item) for item in (*system.drive.state, DDQ1, *REFERENCE, E, SIGMA)},
         **{name: force(name) for name in ("u", "u_s", "u_f", "G", "C_dq1", "S", "z_bar", "eta")},
+        "dsigma": [(f"d{name}", f"{unit}^2") for name, unit in of(SIGMA)],
         "ddeta": force("ddeta", "/s^2"),
-        "b": base("", ""),
-        "db": base("d_", "/s"),
-        "ddb": base("dd_", "/s^2"),
-        "t": [("t", "s")],
-        "w": [
-            *positions["q1d"],
-            *rates["dq1d"],
-            *accelerations["ddq1d"],
-            *(entry for order in (("", ""), ("d_", "/s"), ("dd_", "/s^2")) for entry in base(*order)),
-        ],
-        "x": [*positions["q1"], *rates["dq1"], *positions["q2"], *rates["dq2"]],
-        "dx": [*rates["dq1"], *accelerations["ddq1"], *rates["dq2"], *accelerations["ddq2"]],
+        **{name: of(item) for name, item in zip(("b", "db", "ddb"), BASE, strict=True)},
+        "t": of(T),
+        "d": [(f"d{k}", "") for k in range(system.d.numel())],
+        "w": of(*REFERENCE, *BASE),
+        "x": state,
+        "y": state,
+        "dx": of(*(DERIVATIVES[item] for item in system.drive.state)),
         "M1": [
             (f"M1_{row.name}_{column.name}", f"{row.force} s^2/{column.unit}") for column in joints for row in joints
         ],
@@ -175,6 +171,7 @@ def bind(
     tunable: Sequence[str] | Literal["all", "none"] = "none",
     prefix: str = "springline",
     real: Real = "double",
+    tables: Sequence[Table] = (),
 ) -> Export:
     """The Export of a structure with these numbers.
 
@@ -183,7 +180,9 @@ def bind(
     tunable    parameters that stay arguments: slot keys, or what stands for several ("control", "control.mu")
     prefix     of every public name
     real       number type of the C
-    Raises ValueError for a wrong number of values, a value out of its bounds, an unknown name or an unusable prefix.
+    tables     data of the table signals, in the order of System.tables, for real = "double"; () leaves them out
+    Raises ValueError for a wrong number of values or tables, a value out of its bounds, an unknown name or an unusable
+    prefix.
     """
     system = System(structure)
     if np.shape(values) != (len(system.slots),):
@@ -195,7 +194,9 @@ def bind(
     check_prefix(prefix)
     if real not in ("double", "float"):
         raise ValueError(f"real is {real!r}, expected 'double' or 'float'")
-    return Export(system, numbers, _tunable(system.slots, tunable), prefix, real)
+    if tables and (len(tables) != len(system.tables) or real != "double"):
+        raise ValueError(f"{len(tables)} tables in {real}, expected {len(system.tables)} in double")
+    return Export(system, numbers, _tunable(system.slots, tunable), prefix, real, tuple(tables))
 
 
 _STRUCTURE = frozenset(f"control.{key}" for key in ("law", "log_form", "mode", "period", "fast", "l", "m", "p", "r"))

@@ -14,6 +14,7 @@ from importlib.metadata import version
 
 from springline.codegen.export import Export, comment, provenance
 from springline.codegen.scalar import literal
+from springline.codegen.tables import print_tables
 from springline.codegen.typed import STATUS, TypedInterface
 from springline.codegen.vectors import TIME_STEP, control_outputs
 
@@ -35,6 +36,7 @@ def text_files(export: Export, interface: TypedInterface) -> dict[str, bytes]:
     table = comment([*start, "", *interface_table(interface)])
     hashes = "".join(f"# {line}\n" for line in start)
     return {
+        **_table_files(export, banner),
         f"include/{prefix}.h": _fill("springline.h", common, prefix, table),
         f"src/{prefix}.c": _fill("springline.c", common, prefix, table),
         "main.c": _fill("main.c", common | _main_blocks(interface), prefix, banner),
@@ -42,6 +44,19 @@ def text_files(export: Export, interface: TypedInterface) -> dict[str, bytes]:
         "README.md": _fill("README.md", common | _readme_blocks(export, interface), prefix),
         "CMakeLists.txt": _fill("CMakeLists.txt", common, prefix, hashes),
         f"{prefix}.pc.in": _fill("springline.pc.in", common, prefix, hashes),
+    }
+
+
+def _table_files(export: Export, banner: str) -> dict[str, bytes]:
+    """The scenario's tables, where they are part of the export."""
+    if not export.tables:
+        return {}
+    name = f"{export.prefix}_tables"
+    lines = ['#include "sl_tables.h"', "", *print_tables(export.tables, name), ""]
+    runtime = resources.files("springline.codegen") / "runtime"
+    return {
+        f"src/{name}.h": (banner + "\n".join(lines)).encode(),
+        "src/sl_tables.h": (runtime / "sl_tables.h").read_bytes(),
     }
 
 
@@ -60,9 +75,10 @@ def interface_table(interface: TypedInterface) -> list[str]:
         f"{name}: " + ", ".join(f"{field.name} ({field.unit})" for field in members)
         for name, members in interface.structures.items()
     ]
+    stages = interface.export.system.tableau.stages
     counts = [f"{name} {body.operations}" for name, body in interface.bodies.items()]
     wrapped = [part for line in lines for part in textwrap.wrap(line, 110, subsequent_indent="    ")]
-    return [*wrapped, f"operations: {', '.join(counts)} (a plant step takes four plant evaluations)"]
+    return [*wrapped, f"operations: {', '.join(counts)} (a plant step takes {stages} plant evaluations)"]
 
 
 def _main_blocks(interface: TypedInterface) -> dict[str, str]:
@@ -76,9 +92,6 @@ def _main_blocks(interface: TypedInterface) -> dict[str, str]:
         "table_warning": f'  fprintf(stderr, "main: {missing}\\n");\n' if missing else "",
         "csv_header": ",".join(["t", *(name for _, name in shown)]),
         "print_fields": "\n".join(f'  printf(",%.{digits}g", (double){owner}->{name});' for owner, name in shown),
-        "measure": "\n".join(
-            f"    measurement.{field.name} = state.{field.name};" for field in interface.structures["measurement"]
-        ),
     }
 
 
@@ -111,14 +124,15 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         ]
         members = [f"springline_default_config.parameters.{slot.symbol}" for slot in tunable]
         call += [f"  {export.real} p[{len(tunable)}];"]
+    parts = 3 + len(export.system.command_parts)  # the model's control gives the command, these, error, sigma
     pointers = [f"in + {k * n}" for k in range(3)] + ["x"] + (["p"] if tunable else [])
     call += [
         f"  const {export.real} *arg[{len(pointers)}] = {{0}};",
-        f"  {export.real} *res[5] = {{0}};",
+        f"  {export.real} *res[{parts}] = {{0}};",
         *(f"  x[{states.index(name)}] = in[{3 * n + k}];" for k, name in enumerate(measured)),
         *((f"  p[{k}] = {member};" for k, member in enumerate(members)) if tunable else ()),
         *(f"  arg[{k}] = {pointer};" for k, pointer in enumerate(pointers)),
-        *(f"  res[{k}] = got + {k * n};" for k in range(5)),
+        *(f"  res[{k}] = got + {k * n};" for k in range(parts)),
         "  if (springline_control(arg, res, 0, 0, 0) != 0) return 1;",
     ]
     return {
@@ -128,7 +142,7 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "control_in": str(3 * n + len(measured)),
         "control_out": str(len(outputs)),
         "command_out": str(n),
-        "model_out": str(5 * n),
+        "model_out": str(parts * n),
         "command_to_vector": taken([f"command.{name}" for name in outputs[:n]]),
         "first_measurement": measured[0],
         "zero": literal(0.0, export.real),
@@ -156,8 +170,8 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
 
 def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
     tunable = set(export.tunable)
-    single = export.real == "float"
-    cost = {"springline_step": "control", "one evaluation of the plant, of four in springline_plant_step": "plant"}
+    single, stages = export.real == "float", export.system.tableau.stages
+    cost = {"springline_step": "control", f"one evaluation of the plant, of {stages} in springline_plant_step": "plant"}
     return {
         "table_note": (
             f"{interface.missing_tables.removesuffix('.')}, in `{export.prefix}_signals` and so in what `main.c` runs "

@@ -23,7 +23,7 @@ from springline.codegen.fmu_document import description, document
 from springline.codegen.fmu_settings import FmiVersion, Settings
 from springline.codegen.fmu_source import sources
 from springline.codegen.fmu_variables import PARTS, Part, interface, part_parameters
-from springline.codegen.kernel import Table
+from springline.codegen.tables import Table
 from springline.codegen.typed import TypedInterface
 from springline.model.system import Structure, System
 
@@ -64,11 +64,11 @@ def fmu(
         raise ValueError(f"{len(tables)} tables given, the system has {len(system.tables)}")
     wanted = bind(structure, values, tunable=tunable).tunable
     keys = [system.slots[i].key for i in part_parameters(system, part) if i in set(wanted)]
-    export = bind(structure, values, tunable=keys, prefix=identifier)
+    needed = () if part == "controller" else tables
+    export = bind(structure, values, tunable=keys, prefix=identifier, tables=needed)
     typed = TypedInterface(export)
     shown = interface(export, typed, part)
-    needed = () if part == "controller" else tables
-    code = sources(export, typed, shown, settings, needed, version)
+    code = sources(export, typed, shown, settings, version)
     describe = partial(
         model_description, shown, settings, version, identifier=identifier, name=name, description=description(shown)
     )

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-import textwrap
-from collections.abc import Sequence
 from importlib import resources
 
-from springline.codegen.baking import print_baked
 from springline.codegen.export import Export, comment, provenance
 from springline.codegen.export_text import text_files
 from springline.codegen.fmu_settings import FmiVersion, Settings
 from springline.codegen.fmu_variables import NO_LIMIT, Interface, Variable, base_is_input
-from springline.codegen.kernel import Table
 from springline.codegen.names import check_files
-from springline.codegen.scalar import literal
+from springline.codegen.stepping import scalar_slopes, scalar_stages
 from springline.codegen.typed import TypedInterface, literal_constant
 
 _HEADERS = {
@@ -29,38 +25,29 @@ def sources(
     typed: TypedInterface,
     interface: Interface,
     settings: Settings,
-    tables: Sequence[Table],
     version: FmiVersion,
 ) -> dict[str, bytes]:
     """The files of sources/ by name, but for fmu_token.h; all.c includes the others and is the one to compile."""
     stem, part = export.prefix, interface.part
     texts = text_files(export, typed)
-    own = {f"{stem}.h": texts[f"include/{stem}.h"], f"{stem}.c": texts[f"src/{stem}.c"]}
-    files = {}
+    own = {path.rpartition("/")[2]: text for path, text in texts.items() if path.startswith(("include/", "src/"))}
+    files = {name: own.pop(name) for name in [*own] if name.startswith("sl_")}
     runtime = resources.files("springline.codegen") / "runtime"
     files["sl_math.h"] = (runtime / "sl_math.h").read_bytes()
     for name in _HEADERS[version]:
         files[name] = (runtime / "fmu" / name).read_bytes()
     steps = [f"{part}.c", *([] if part == "controller" else ["stepping.c"])]
     fixed = ["state.h", *steps, "instance.h", f"fmi{version}.c"]
-    printed = _functions(export, interface, settings, bool(tables))
     after = []
-    if printed:
-        files["sl_casadi.h"] = (runtime / "sl_casadi.h").read_bytes()
-        files["functions.c"] = (comment(provenance(export)) + printed).encode()
-        after.append("functions.c")
-    if tables:
-        fixed.append("tables.c")
-        after.append("tables.c")
     for name in fixed:
         files[name] = _named((runtime / "fmu" / name).read_text(encoding="utf-8"), stem).encode()
-    model = _model(export, typed, interface, settings, tables)
+    model = _model(export, typed, interface, settings)
     files["fmu_model.h"] = (comment(provenance(export)) + _named(model, stem)).encode()
     if part != "controller":
-        glue = _glue(export, typed, interface, settings, bool(tables))
+        glue = _glue(export, typed, interface, settings)
         files["fmu_glue.h"] = (comment(provenance(export)) + _named(glue, stem)).encode()
         after.append("fmu_glue.h")
-    includes = ["fmu_model.h", "state.h", *after, *steps, f"fmi{version}.c", f"{stem}.c"]
+    includes = ["fmu_model.h", f"{stem}.c", "state.h", *after, *steps, f"fmi{version}.c"]
     files["all.c"] = (
         comment([*provenance(export), "", "The whole FMU; compile this file alone, as C99."])
         + "".join(f'#include "{name}"\n' for name in includes)
@@ -83,7 +70,6 @@ def _model(
     typed: TypedInterface,
     interface: Interface,
     settings: Settings,
-    tables: Sequence[Table],
 ) -> str:
     part, system = interface.part, export.system
     if part == "controller":  # its signals come from outside
@@ -117,7 +103,6 @@ def _model(
         f"  FMU_STATES = {len(typed.structures['state'])},",
         f"  FMU_JOINTS = {system.n},",
         f"  FMU_DIAGNOSTICS = {len(typed.structures['diagnostics'])},",
-        f"  FMU_TABLES = {len(tables)},",
         ",\n".join(f"  FMU_AT_{name.upper()} = {place}" for name, place in interface.blocks.items()),
         "};",
         "",
@@ -139,7 +124,7 @@ def _model(
         "",
     ]
     copies = _copies(export, typed, interface)
-    return "\n".join([*lines, *copies, *_tables(tables)])
+    return "\n".join([*lines, *copies])
 
 
 def _row(variable: Variable) -> str:
@@ -166,14 +151,7 @@ def _copies(export: Export, typed: TypedInterface, interface: Interface) -> list
         direction, _, structure = name.partition("_")
         lines += _copy(typed, structure, direction == "get")
     if interface.part == "loop":
-        lines += ["#if FMU_HOLD > 0", *_copy(typed, "command", True), *_copy(typed, "state", True), "#endif", ""]
-        order = [field.name for field in typed.structures["state"]]
-        lines += [
-            "static void fmu_measure(const double *x, springline_measurement *s) {",
-            *(f"  s->{f.name} = x[{order.index(f.name)}];" for f in typed.structures["measurement"]),
-            "}",
-            "",
-        ]
+        lines += ["#if FMU_HOLD > 0", *_copy(typed, "command", True), "#endif", "", *_copy(typed, "state", True)]
     lines.append("static void fmu_get_parameters(const double *v, springline_config *config) {")
     if export.tunable:
         for k, slot in enumerate(export.tunable_slots):
@@ -195,63 +173,11 @@ def _copy(typed: TypedInterface, structure: str, get: bool) -> list[str]:
     return [head, *body, "}", ""]
 
 
-def _tables(tables: Sequence[Table]) -> list[str]:
-    if not tables:
-        return []
-    lines = [
-        "typedef struct {",
-        "  double t0, dt; /* s */",
-        "  int64_t intervals;",
-        "  int channels, periodic;",
-        "  const double *coefficients; /* intervals x channels x 4 */",
-        "} fmu_table;",
-        "",
-    ]
-    rows = []
-    for i, table in enumerate(tables):
-        intervals, channels, _ = table.coefficients.shape
-        lines.append(f"static const double fmu_coefficients_{i}[] = {{")
-        lines += [
-            "  " + ", ".join(literal(float(c), "double") for c in interval.ravel()) + ","
-            for interval in table.coefficients
-        ]
-        lines += ["};", ""]
-        start = f"{literal(table.t0, 'double')}, {literal(table.dt, 'double')}"
-        rows.append(f"  {{{start}, {intervals}, {channels}, {int(table.periodic)}, fmu_coefficients_{i}}},")
-    return [*lines, "static const fmu_table fmu_tables[FMU_TABLES] = {", *rows, "};", ""]
+# --- fmu_glue.h ------------------------------------------------------------------------------------------
 
 
-# --- functions that the C interface does not have ----------------------------------------------------------
-
-
-def _wants_slope(interface: Interface, settings: Settings) -> bool:
-    """Whether the law is part of the differential equation: then its right-hand side is needed by itself."""
-    return interface.part == "loop" and settings.period == 0.0
-
-
-def _functions(export: Export, interface: Interface, settings: Settings, tables: bool) -> str:
-    wanted = []
-    if _wants_slope(interface, settings):
-        wanted.append((f"{export.prefix}_slope", export.system.function("plant")))
-    if tables:
-        wanted.append((f"{export.prefix}_table_signals", export.system.function("signals")))
-    if not wanted:
-        return ""
-    printed = print_baked(wanted, export.tunable, export.values, "functions", ("sl_casadi.h",))
-    return (
-        "#define CASADI_SYMBOL_EXPORT static\n"
-        "#if defined(__GNUC__) /* entry points that CasADi adds and nobody here calls */\n"
-        '#pragma GCC diagnostic ignored "-Wunused-function"\n'
-        '#pragma GCC diagnostic ignored "-Wunused-parameter"\n'
-        "#endif\n"
-        f"{printed}"
-    )
-
-
-def _glue(export: Export, typed: TypedInterface, interface: Interface, settings: Settings, tables: bool) -> str:
-    """fmu_glue.h: signals and the plant's right-hand side, in the form that plant.c and loop.c expect."""
-    reference, base = ([f"{name}->{field.name}" for field in typed.structures[name]] for name in ("reference", "base"))
-    p = ", parameters" if export.tunable else ""
+def _glue(export: Export, typed: TypedInterface, interface: Interface, settings: Settings) -> str:
+    """fmu_glue.h: the surroundings, and where the law is part of the differential equation, a step of the loop."""
     outside = (
         ["  fmu_get_base(fmu->now.values + FMU_AT_BASE, base);"] if base_is_input(export.system, interface.part) else []
     )
@@ -259,42 +185,40 @@ def _glue(export: Export, typed: TypedInterface, interface: Interface, settings:
         "/* Reference and base motion: the scenario's, or what the importer makes of the base. */",
         "static int fmu_surroundings(const fmu_core *fmu, double t, springline_reference *reference,",
         "                            springline_base *base) {",
+        "  const int status = springline_signals(&fmu->controller, t, reference, base);",
+        *outside,
+        "  return status;",
+        "}",
     ]
-    if tables:
-        lines += [
-            f"  double d[{export.system.d.numel()}], w[{export.system.w.numel()}];",
-            "  const double *parameters = fmu->now.values + FMU_AT_PARAMETERS;",
-            f"  const double *arg[] = {{&t, d{p}}};",
-            "  double *res[] = {w};",
-            "  (void)parameters;",
-            "  fmu_table_data(t, d);",
-            "  (void)springline_table_signals(arg, res, 0, 0, 0);",
-            *(f"  {name} = w[{k}];" for k, name in enumerate([*reference, *base])),
-            *outside,
-            "  return SPRINGLINE_OK;",
-            "}",
-        ]
-    else:
-        lines += [
-            "  const int status = springline_signals(&fmu->controller, t, reference, base);",
-            *outside,
-            "  return status;",
-            "}",
-        ]
-    if _wants_slope(interface, settings):
-        commands = ", ".join(f"command->{field.name}" for field in typed.structures["command"])
-        third = len(base) // 3
-        lines += [
-            "",
-            "static void fmu_slope(const double *parameters, const springline_base *base, const double *x,",
-            "                      const springline_command *command, double *slope) {",
-            "  const double b[] = {",
-            *textwrap.wrap(", ".join(base) + "};", 110, initial_indent="    ", subsequent_indent="    "),
-            f"  const double u[] = {{{commands}}};",
-            f"  const double *arg[] = {{b, b + {third}, b + {2 * third}, x, u{p}}};",
-            "  double *res[] = {slope};",
-            "  (void)parameters;",
-            "  (void)springline_slope(arg, res, 0, 0, 0);",
-            "}",
-        ]
+    if interface.part == "loop" and settings.period == 0.0:
+        lines += ["", *_closed_step(export, typed)]
     return "\n".join([*lines, ""])
+
+
+def _closed_step(export: Export, typed: TypedInterface) -> list[str]:
+    """A step in which every stage has a command of its own, with the bits of the simulation loop."""
+    tableau, states = export.system.tableau, len(typed.structures["state"])
+
+    def evaluate(when: int, at: str, slope: str) -> list[str]:
+        return [
+            f"status = fmu_control(fmu, &reference[{when}], {at}, &command, &diagnostics);",
+            "if (status != SPRINGLINE_OK) return status;",
+            f"springline_evaluate_plant(&fmu->controller, &base[{when}], {at}, &command, {slope});",
+        ]
+
+    work = "".join(f", {name}[FMU_STATES]" for name in ("at", *scalar_slopes(tableau)))
+    return [
+        "static int fmu_control(fmu_core *fmu, const springline_reference *reference, const double *x,",
+        "                       springline_command *command, springline_diagnostics *diagnostics);",
+        "",
+        "/* The loop from x to next. */",
+        "static int fmu_closed_step(fmu_core *fmu, const springline_reference *reference, const springline_base *base,",
+        "                           const double *x, double *next, double step) {",
+        "  springline_command command;",
+        "  springline_diagnostics diagnostics;",
+        f"  double {work.removeprefix(', ')};",
+        "  int status, i;",
+        *(f"  {line}" for line in scalar_stages(tableau, export.real, states, evaluate)),
+        "  return SPRINGLINE_OK;",
+        "}",
+    ]

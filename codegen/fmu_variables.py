@@ -11,7 +11,6 @@ import casadi as ca
 
 from springline.codegen.export import Export
 from springline.codegen.typed import Field, TypedInterface
-from springline.model.base import COORDINATES
 from springline.model.parameters import REAL, Bounds
 from springline.model.system import System
 
@@ -24,22 +23,6 @@ NO_LIMIT = 1e300
 """How an FMU writes infinity, and from where on it reads it: FMI's XML has none, and its importers cannot read one."""
 
 _LEAST = 1e-300  # stands for the least number above 0, which is denormal and not every importer's to read
-
-_MEANINGS = {
-    "q1d": "reference of the joint coordinate",
-    "dq1d": "reference of the joint rate",
-    "ddq1d": "reference of the joint acceleration",
-    "q1": "joint coordinate",
-    "dq1": "joint rate",
-    "q2": "motor coordinate, reflected to the joint",
-    "dq2": "motor rate, reflected to the joint",
-    "U": "command to the motor",
-    "e": "tracking error",
-    "sigma": "sliding variable",
-    "U_s": "slow part of the command, before its limit",
-    "U_f": "fast part of the command, before its limit",
-    "saturated": "whether U_max limits the command",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,24 +139,11 @@ def interface(export: Export, typed: TypedInterface, part: Part) -> Interface:
     for causality, structures in groups:
         for structure in structures:
             blocks[structure] = len(variables)
-            variables += [_signal(export.system, field, causality) for field in typed.structures[structure]]
+            variables += [_signal(field, causality) for field in typed.structures[structure]]
     return Interface(part, tuple(variables), blocks)
 
 
-def _signal(system: System, field: Field, causality: Causality) -> Variable:
+def _signal(field: Field, causality: Causality) -> Variable:
     start = 0.0 if causality == "input" else None
     unit = "1" if field.integer else field.unit
-    return Variable(field.name, unit, _meaning(system, field.name), causality, start, boolean=field.integer)
-
-
-def _meaning(system: System, name: str) -> str:
-    for joint in system.joints:
-        quantity = name.removesuffix(f"_{joint.name}")
-        if quantity != name:
-            return f"{_MEANINGS[quantity]} ({joint.name})"
-    orders = {"dd_": "acceleration of the base, ", "d_": "rate of the base, ", "": "motion of the base, "}
-    for prefix, meaning in orders.items():
-        for coordinate in COORDINATES:
-            if name == prefix + coordinate.symbol:
-                return meaning + coordinate.key
-    raise KeyError(name)
+    return Variable(field.name, unit, field.meaning, causality, start, boolean=field.integer)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import math
-import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -16,7 +14,9 @@ from numpy.typing import NDArray
 from springline.codegen import toolchain
 from springline.codegen.kernel_source import ONE_RUN, Engine, KernelOptions, KernelSource, print_kernel
 from springline.codegen.memory import memory
+from springline.codegen.numbers import real, shown, whole
 from springline.codegen.program import Program, program
+from springline.codegen.tables import Table
 from springline.model.base import COORDINATES
 from springline.model.parameters import Joint
 from springline.model.system import Structure, TableLayout
@@ -75,57 +75,6 @@ class LayoutError(RuntimeError):
     """The compiled loop and this file do not agree on what is where in memory."""
 
 
-def _whole(name: str, value: object, low: int, high: int) -> int:
-    """`value` as an int. Raises ValueError if it is none, or not in low .. high."""
-    try:
-        number = operator.index(value)  # type: ignore[arg-type] # refuses what is no integer
-    except TypeError:
-        number = None
-    if number is None or isinstance(value, bool) or not low <= number <= high:
-        raise ValueError(f"{name} is {_shown(value)}, expected a whole number from {low} to {high}")
-    return number
-
-
-def _real(name: str, value: object, *, positive: bool = False, infinite: bool = False) -> float:
-    """`value` as a float. Raises ValueError if it is none, not finite (unless `infinite`), or not positive if asked."""
-    try:
-        number = float(value)  # type: ignore[arg-type] # refuses what is no number
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not (math.isfinite(number) or (infinite and number == math.inf)) or (positive and number <= 0.0):
-        expected = f"a {'positive' if positive else 'finite'} number" + (" or inf" if infinite else "")
-        raise ValueError(f"{name} is {_shown(value)}, expected {expected}")
-    return number
-
-
-def _shown(value: object) -> str:
-    """A value for a message; an integer that Python would refuse to print, by its size."""
-    if isinstance(value, int) and abs(value) >= 10**40:
-        return f"an integer of {value.bit_length()} bits"
-    return repr(value)
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """Knots of one table signal: interval k starts at t0 + k dt; coefficients (intervals, channels, 4), tau in s.
-
-    Raises ValueError for what the loop could not find an interval in.
-    """
-
-    t0: float
-    dt: float
-    periodic: bool
-    coefficients: Floats
-
-    def __post_init__(self) -> None:
-        _real("t0 of a table", self.t0)
-        _real("dt of a table", self.dt, positive=True)
-        if self.coefficients.ndim != 3 or len(self.coefficients) == 0:
-            shape = self.coefficients.shape
-            raise ValueError(f"coefficients of a table have shape {shape}, expected (at least 1, channels, 4)")
-        _real("end of a table, t0 + intervals * dt,", self.t0 + len(self.coefficients) * self.dt)
-
-
 @dataclass(frozen=True, slots=True)
 class LoopSettings:
     """What the loop is told about every run of a batch: steps of h s, bound on |x_i|, sampling, output, thresholds.
@@ -144,18 +93,18 @@ class LoopSettings:
 
     def __post_init__(self) -> None:
         checked = {
-            "steps": _whole("steps", self.steps, 0, MOST_STEPS),
-            "step": _real("step", self.step, positive=True),
-            "bound": _real("bound", self.bound, positive=True, infinite=True),
-            "hold": _whole("hold", self.hold, 1, MOST_STEPS),
-            "output_every": _whole("output_every", self.output_every, 0, MOST_STEPS),
-            "response_band": _real("response_band", self.response_band),
-            "settling_band": _real("settling_band", self.settling_band),
-            "start_time": _real("start_time", self.start_time),
+            "steps": whole("steps", self.steps, 0, MOST_STEPS),
+            "step": real("step", self.step, positive=True),
+            "bound": real("bound", self.bound, positive=True, infinite=True),
+            "hold": whole("hold", self.hold, 1, MOST_STEPS),
+            "output_every": whole("output_every", self.output_every, 0, MOST_STEPS),
+            "response_band": real("response_band", self.response_band),
+            "settling_band": real("settling_band", self.settling_band),
+            "start_time": real("start_time", self.start_time),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)  # the numbers that were checked, whatever type they came in
-        _real("end, start_time + steps * step,", self.start_time + self.steps * self.step)
+        real("end, start_time + steps * step,", self.start_time + self.steps * self.step)
 
     @property
     def rows(self) -> int:
@@ -208,7 +157,7 @@ class _Struct(ctypes.Structure):
             given = values.pop(name)
             held = getattr(self, name)
             if held != given:
-                raise ValueError(f"{name} is {_shown(given)}, which C would take for {held!r}")
+                raise ValueError(f"{name} is {shown(given)}, which C would take for {held!r}")
         if values:
             raise TypeError(f"{type(self).__name__} has no {', '.join(values)}")
 

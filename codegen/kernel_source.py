@@ -17,7 +17,7 @@ from springline.model.base import COORDINATES
 
 Engine = Literal["lanes", "casadi"]
 
-_RUNTIME = ("loop.c", "metrics.h", "simulate.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
+_RUNTIME = ("loop.c", "metrics.h", "simulate.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
 
 
 @dataclass(frozen=True, slots=True)

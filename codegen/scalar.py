@@ -81,8 +81,9 @@ class _Values(ValueGraph):
                 self.leaf("p", column[i], Binding.RUN, varies=True) if i in column else self.constant(value)
                 for i, value in enumerate(export.values)
             ],
-            "d": [self.constant(0.0)] * export.system.d.numel(),  # tables are not part of an export
         }
+        if not export.tables:
+            self._known["d"] = [self.constant(0.0)] * export.system.d.numel()
 
     def apply(self, function: ca.Function, **given: list[int]) -> list[int]:
         """Add a Function; the nodes of all its outputs' entries. Inputs not given are leaves of their own names."""
@@ -124,7 +125,11 @@ class ScalarPrinter:
         self._math = "slf" if export.real == "float" else "sl"
         self._hoist = hoist
         self._graph = _Values(export)
-        self._wanted = {function.name(): self._graph.apply(function) for function in functions}
+        beginning = {"t": [self._graph.constant(0.0)]}
+        self._wanted = {
+            function.name(): self._graph.apply(function, **(beginning if function.name() == "start" else {}))
+            for function in functions
+        }
         self._labels = {
             function.name(): [label for port in export.outputs(function) for label in port.labels]
             for function in functions
@@ -173,10 +178,14 @@ class ScalarPrinter:
     def body(self, name: str, load: Callable[[str, int], str], targets: Sequence[str]) -> Body:
         """Function `name`; load(input, entry) is the C of an input ("derived" is one).
 
-        targets  take its outputs, the first of them where there are more outputs than targets
+        targets  take its outputs, the first of them where there are more outputs than targets; "" takes none
         """
-        wanted = self._wanted[name]
-        return self._body(wanted, self._needed(wanted), load, targets, self._labels[name])
+        wanted, labels = self._wanted[name], self._labels[name]
+        if "" in targets:
+            taken = [k for k, target in enumerate(targets) if target]
+            wanted, labels = [wanted[k] for k in taken], [labels[k] for k in taken]
+            targets = [targets[k] for k in taken]
+        return self._body(wanted, self._needed(wanted), load, targets, labels)
 
     def derive(self, load: Callable[[str, int], str], target: str) -> Body:
         """What `functions` expect under target[0], target[1], …"""
@@ -184,6 +193,10 @@ class ScalarPrinter:
         needed = self._graph.needed(wanted, Binding.RUN)
         targets = [f"{target}[{k}]" for k in range(len(wanted))]
         return self._body(wanted, needed, load, targets, [f"r{k}" for k in range(len(wanted))], deriving=True)
+
+    def _is_input(self, i: int) -> bool:
+        node = self._graph.nodes[i]
+        return node.op is None and node.binding is not Binding.CONSTANT
 
     def _needed(self, wanted: Sequence[int]) -> list[int]:
         found = self._graph.needed(wanted, Binding.STATE)
@@ -214,16 +227,18 @@ class ScalarPrinter:
         names = self._named(wanted, needed, labels)
         pairs = {(nodes[i].op, nodes[i].arguments[0]): i for i in needed if nodes[i].op in (ca.OP_SIN, ca.OP_COS)}
 
+        def given(i: int) -> str:
+            derived = not deriving and i in self._derived
+            return load("derived", self._derived[i]) if derived else load(*nodes[i].source)
+
         def value(i: int) -> str:
             node = nodes[i]
             if node.binding is Binding.CONSTANT:
                 return literal(node.value, self._real)
             if i not in ready:
                 ready.add(i)
-                derived = not deriving and i in self._derived
-                given = load("derived", self._derived[i]) if derived else load(*node.source)
-                if given != names[i]:
-                    lines.append(f"const {self._real} {names[i]} = {given};")
+                if given(i) != names[i]:
+                    lines.append(f"const {self._real} {names[i]} = {given(i)};")
             return f"{self._math}_true({names[i]})" if node.op in MASKS else names[i]
 
         def truth(i: int) -> str:
@@ -245,7 +260,8 @@ class ScalarPrinter:
             kind = "int" if node.op in MASKS else self._real
             lines.append(f"const {kind} {names[i]} = {text};")
             ready.add(i)
-        values = [value(i) for i in wanted]
+        # What is only handed on needs no name.
+        values = [given(i) if self._is_input(i) and i not in ready else value(i) for i in wanted]
         lines += [f"{target} = {text};" for target, text in zip(targets, values[: len(targets)], strict=True)]
         return Body(tuple(lines), tuple(values), len(needed), self._live(wanted, needed))
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from springline.codegen.export import Real
+from springline.codegen.scalar import literal
 from springline.model.integrators import Number, Tableau
 
 Term = tuple[float, int]
@@ -69,6 +71,48 @@ def statements(
     if update.at:
         terms = " + ".join(f"{gain(factor)} * {slope(k)}" for factor, k in update.at)
         yield f"{element('at')} = {element('x')} + {terms};"
+
+
+def scalar_slopes(tableau: Tableau) -> tuple[str, ...]:
+    """Names of the arrays that `scalar_stages` keeps slopes in."""
+    kept = kept_slopes(tableau)
+    once = () if len(kept) == tableau.stages else ("slope",)
+    return (*once, *(f"slope_{k}" for k in kept))
+
+
+def scalar_stages(
+    tableau: Tableau, real: Real, states: int, evaluate: Callable[[int, str, str], list[str]]
+) -> Iterator[str]:
+    """Lines of C that take the array x to the array next, with `at` and `scalar_slopes` to work in.
+
+    real      number type
+    states    length of the arrays
+    evaluate  (place among the nodes, where, into what) -> lines that evaluate the slope
+    """
+    kept = kept_slopes(tableau)
+
+    def slope(k: int) -> str:
+        return f"slope_{k}" if k in kept else "slope"
+
+    for stage, when in enumerate(tableau.when):
+        yield f"/* stage {stage + 1} of {tableau.stages} */"
+        yield from evaluate(when, "at" if stage else "x", slope(stage))
+        gains: dict[float, str] = {}
+        lines = statements(
+            tableau,
+            stage,
+            element=lambda name: f"{name}[i]",
+            slope=lambda k: f"{slope(k)}[i]",
+            gain=lambda factor: gains.setdefault(factor, f"gain_{len(gains)}"),  # noqa: B023 - used within the turn
+        )
+        body = list(lines)
+        yield "{"
+        for factor, name in gains.items():
+            yield f"  const {'float' if real == 'float' else 'double'} {name} = {literal(factor, real)} * step;"
+        yield f"  for (i = 0; i < {states}; i++) {{"
+        yield from (f"    {line}" for line in body)
+        yield "  }"
+        yield "}"
 
 
 def kernel_update(tableau: Tableau) -> str:

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 from springline.codegen.export import Export, Real, port_entries
 from springline.codegen.scalar import Body, ScalarPrinter, literal
+from springline.codegen.stepping import scalar_slopes, scalar_stages
 from springline.model.parameters import Bounds
+from springline.model.quantities import A_LIMITED, BASE, REFERENCE, SATURATED, SIGMA, E, Quantity, U, entries
 
 STATUS = (
     ("OK", "done"),
@@ -30,10 +32,11 @@ _MATH_STACK = 160  # bytes below the deepest elementary function, as measured on
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A member of a structure: its name, its unit, and "integer" or "real"."""
+    """A member of a structure: its name, its unit, what it is, and whether it is an integer."""
 
     name: str
     unit: str
+    meaning: str
     integer: bool = False
 
 
@@ -43,46 +46,41 @@ class TypedInterface:
     def __init__(self, export: Export) -> None:
         self.export = export
         system = export.system
-        entries = port_entries(system)
-        names = ("control", "plant", "start", "signals")
+        names = ("measure", "control", "plant", "start", "signals")
         self._printer = ScalarPrinter(export, [system.function(name) for name in names], hoist=True)
         self._printer.compose("control", "sigma", system.function(f"law_{system.structure.law}"), "dsigma")
         read = self._printer.reads("control")
 
-        def fields(*ports: str) -> tuple[Field, ...]:
-            return tuple(Field(label, unit) for port in ports for label, unit in entries[port])
+        def declared(*quantities: Quantity, integer: bool = False) -> tuple[Field, ...]:
+            found = entries(quantities, system.joints)
+            return tuple(Field(entry.name, entry.unit, entry.meaning, integer) for entry in found)
 
-        def per_joint(*quantities: tuple[str, str]) -> tuple[Field, ...]:
-            return tuple(
-                Field(f"{quantity}_{joint.name}", unit.format(q=joint.unit, F=joint.force))
-                for quantity, unit in quantities
-                for joint in system.joints
-            )
-
-        flags = tuple(
-            Field(f"{flag}_{joint.name}", "0 or 1", integer=True)
-            for flag in ("saturated", "a_limited")
-            for joint in system.joints
-        )
+        numbers = declared(E, SIGMA, *system.command_parts)
         self.structures: dict[str, tuple[Field, ...]] = {
-            "reference": fields("q1d", "dq1d", "ddq1d"),
-            "measurement": tuple(field for k, field in enumerate(fields("x")) if ("x", k) in read),
-            "command": per_joint(("U", "{F}")),
-            "diagnostics": (*per_joint(("e", "{q}"), ("sigma", "{q}/s"), ("U_s", "{F}"), ("U_f", "{F}")), *flags),
-            "state": fields("x"),
-            "base": fields("b", "db", "ddb"),
+            "reference": declared(*REFERENCE),
+            "measurement": tuple(f for k, f in enumerate(declared(*system.drive.state)) if ("x", k) in read),
+            "command": declared(U),
+            "diagnostics": (*numbers, *declared(SATURATED, A_LIMITED, integer=True)),
+            "state": declared(*system.drive.state),
+            "base": declared(*BASE),
         }
         if export.tunable:
-            self.structures["parameters"] = tuple(Field(slot.symbol, slot.unit) for slot in export.tunable_slots)
+            self.structures["parameters"] = tuple(
+                Field(slot.symbol, slot.unit, slot.meaning) for slot in export.tunable_slots
+            )
         self.derived = self._printer.derived
 
         state, base = self.structures["state"], self.structures["base"]
         reference, command = self.structures["reference"], self.structures["command"]
         signals = [f"reference->{f.name}" for f in reference] + [f"base->{f.name}" for f in base]
-        parts = self.structures["diagnostics"][: 4 * system.n]
-        e, sigma, slow, fast = (parts[k * system.n : (k + 1) * system.n] for k in range(4))
-        seen = [f"diagnostics->{f.name}" for f in (*slow, *fast, *e, *sigma)]
+        seen = [f"diagnostics->{f.name}" for f in (*numbers[2 * system.n :], *numbers[: 2 * system.n])]
+        measured = {field.name for field in self.structures["measurement"]}
         self.bodies: dict[str, Body] = {
+            "measure": self._printer.body(
+                "measure",
+                self._load({"x": "state->"}),
+                [f"measurement->{f.name}" if f.name in measured else "" for f in state],
+            ),
             "control": self._printer.body(
                 "control",
                 self._load({"q1d": "reference->", "dq1d": "reference->", "ddq1d": "reference->", "x": "measurement->"}),
@@ -93,13 +91,13 @@ class TypedInterface:
                 self._load({"b": "base->", "db": "base->", "ddb": "base->", "u": "command->"}, x_is_array=True),
                 [f"dx[{k}]" for k in range(len(state))],
             ),
-            "start": self._printer.body("start", self._load({}), [f"state->{f.name}" for f in state]),
+            "start": self._printer.body("start", self._load({"t": ""}), [f"state->{f.name}" for f in state]),
             "signals": self._printer.body("signals", self._load({"t": ""}), signals),
         }
 
     def _load(self, owners: dict[str, str], *, x_is_array: bool = False) -> Callable[[str, int], str]:
         """C of the inputs: members of the structures they come in."""
-        entries = port_entries(self.export.system)
+        ports = port_entries(self.export.system)
         symbols = [slot.symbol for slot in self.export.tunable_slots]
 
         def load(name: str, k: int) -> str:
@@ -107,9 +105,9 @@ class TypedInterface:
                 return f"controller->derived[{k}]"
             if name == "p":
                 return f"controller->config.parameters.{symbols[k]}"
-            if name == "x" and x_is_array:
-                return f"x[{k}]"
-            label = entries[name][k][0]
+            if (name == "x" and x_is_array) or name == "d":
+                return f"{name}[{k}]"
+            label = ports[name][k][0]
             return owners[name] + (label.replace("u_", "U_", 1) if name == "u" else label)
 
         return load
@@ -151,7 +149,9 @@ class TypedInterface:
             for name in ("reference", "measurement", "command", "base")
         }
         diagnostics = self.structures["diagnostics"]
-        sums = [f"diagnostics->U_s_{j.name} + diagnostics->U_f_{j.name}" for j in system.joints]
+        sums = [
+            " + ".join(f"diagnostics->{part.name}_{j.name}" for part in system.command_parts) for j in system.joints
+        ]
         values = [f"diagnostics->{field.name}" for field in diagnostics if not field.integer]
         flags = [
             f"  diagnostics->saturated_{j.name} = command->U_{j.name} < {total} || command->U_{j.name} > {total};"
@@ -170,11 +170,14 @@ class TypedInterface:
             "control_is_finite": _all(f"springline_is_finite({value})" for value in (*values, *sums)),
             "control": "\n".join(["  (void)controller;", *self._lines("control"), *flags]),
             "plant": "\n".join(["  (void)controller, (void)base;", *self._lines("plant")]),
-            "start": "\n".join(self._lines("start")),
-            "signals": "\n".join(f"  {line}" for line in self._lines("signals")),
+            "measure": "\n".join(self._lines("measure")),
+            "start": "\n".join([*self._table_data("start", "0.0"), *self._lines("start")]),
+            "signals": "\n".join(f"  {line}" for line in [*self._table_data("signals", "t"), *self._lines("signals")]),
+            "tables": f'#include "{export.prefix}_tables.h"\n' if export.tables else "",
             "state_to_x": "\n".join(f"  x[{k}] = state->{field.name};" for k, field in enumerate(state)),
             "next_to_state": "\n".join(f"  state->{field.name} = next[{k}];" for k, field in enumerate(state)),
             "states": str(len(state)),
+            **self._stepping(),
             "control_operations": str(self.bodies["control"].operations),
             "plant_operations": str(self.bodies["plant"].operations),
             "signals_meaning": self._signals_meaning(),
@@ -210,6 +213,31 @@ class TypedInterface:
             else "",
         }
         return blocks
+
+    def _stepping(self) -> dict[str, str]:
+        """The integrator: its nodes, and the stages of a plant step."""
+        tableau, real = self.export.system.tableau, self.export.real
+        states = len(self.structures["state"])
+
+        def evaluate(when: int, at: str, slope: str) -> list[str]:
+            return [f"springline_evaluate_plant(controller, motion[{when}], {at}, command, {slope});"]
+
+        lines = scalar_stages(tableau, real, states, evaluate)
+        nodes = ", ".join(literal(node, real) for node in tableau.nodes)
+        return {
+            "slopes": "".join(f", {name}[{states}]" for name in scalar_slopes(tableau)),
+            "plant_stages": "\n".join(f"  {line}".rstrip() for line in lines),
+            "base_nodes": str(len(tableau.nodes)),
+            "base_node_values": "{" + nodes + "}",
+            "integrator": f"{tableau.title}, order {tableau.order}",
+        }
+
+    def _table_data(self, name: str, time: str) -> list[str]:
+        """Statements that look up what body `name` reads of the tables."""
+        if not any(source == "d" for source, _ in self._printer.reads(name)):
+            return []
+        tables = f"springline_tables, {len(self.export.tables)}"
+        return [f"  double d[{self.export.system.d.numel()}];", f"  sl_table_data({tables}, {time}, d, 1);"]
 
     def _lines(self, name: str) -> list[str]:
         return [f"  {line}" for line in self.bodies[name].lines]
@@ -264,7 +292,7 @@ class TypedInterface:
         structure = self.export.system.structure
         signals = (("reference", structure.reference), ("base motion", structure.base_motion))
         tables = [name for name, shape in signals if shape.kind == "table"]
-        if not tables:
+        if not tables or self.export.tables:
             return ""
         noun = "tables are" if len(tables) > 1 else "table is"
         return f"The scenario's {' and '.join(tables)} {noun} not part of the export: zero here."

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import ctypes
 import math
+import operator
 import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import reduce
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -18,7 +20,10 @@ from numpy.typing import NDArray
 
 from springline.codegen import toolchain
 from springline.codegen.export import Export, provenance
+from springline.codegen.stepping import updates
 from springline.codegen.typed import TypedInterface
+from springline.model.integrators import Tableau
+from springline.model.quantities import A_LIMITED, SATURATED, SIGMA, E, U, entries
 
 CONTROL_VECTORS = 1000
 PLANT_VECTORS = 200
@@ -85,8 +90,8 @@ def test_vectors(export: Export, interface: TypedInterface, sources: Mapping[str
 
 def control_outputs(export: Export) -> list[str]:
     """What a control vector's outputs are called, in order: those of the model's control, then the flags of limits."""
-    quantities = ("U", "U_s", "U_f", "e", "sigma", "saturated", "a_limited")
-    return [f"{quantity}_{joint.name}" for quantity in quantities for joint in export.system.joints]
+    quantities = (U, *export.system.command_parts, E, SIGMA, SATURATED, A_LIMITED)
+    return [entry.name for entry in entries(quantities, export.system.joints)]
 
 
 def _finite(export: Export, outputs: Sequence[str], rows: Iterable[list[float]]) -> Iterator[list[float]]:
@@ -139,17 +144,19 @@ def _control_rows(interface: TypedInterface, model: _Model) -> Iterator[list[flo
         dq1 = [a - b for a, b in zip(dq1d, rate, strict=True)]
         dq2 = [a + b for a, b in zip(dq1, draw.small(0, n), strict=True)]
         reference = np.array([*q1d, *dq1d, *ddq1d], model.dtype)
-        x = np.array([*q1, *dq1, *q1, *dq2], model.dtype)
+        x = np.array([*q1, *dq1, *q1, *dq2][: system.x.numel()], model.dtype)
         outputs = model("control", *np.split(reference, 3), x)
-        flags = _limits_met(interface.export, model, *outputs)
+        flags = _limits_met(interface.export, model, outputs)
         yield [*reference, *x[measured], *(value for part in outputs for value in part), *flags]
 
 
-def _limits_met(
-    export: Export, model: _Model, u: Numbers, slow: Numbers, fast: Numbers, _: Numbers, sigma: Numbers
-) -> Iterator[float]:
-    """Per joint whether U_max has limited the command (0 or 1), then whether a_max has limited the reaching law."""
-    yield from (u != slow + fast).astype(float)
+def _limits_met(export: Export, model: _Model, outputs: Sequence[Numbers]) -> Iterator[float]:
+    """Per joint whether U_max has limited the command (0 or 1), then whether a_max has limited the reaching law.
+
+    outputs  of the model's control: the command, the parts it is the sum of, error, sliding variable
+    """
+    u, *parts, _, sigma = outputs
+    yield from (u != reduce(operator.add, parts)).astype(float)
     law = f"law_{export.system.structure.law}"
     for i, value in enumerate(sigma):
         [wished] = model(law, np.array([value], model.dtype))
@@ -157,28 +164,33 @@ def _limits_met(
 
 
 def _plant_rows(interface: TypedInterface, model: _Model) -> Iterator[list[float]]:
-    n, draw = interface.export.system.n, _Draw()
+    system, draw = interface.export.system, _Draw()
+    n, coordinates = system.n, system.base.b.numel()
     for _ in range(PLANT_VECTORS):
-        base = np.array([*draw.uniform(0.5, 3), *draw.uniform(1.0, 3), *draw.uniform(2.0, 3)], model.dtype)
+        base = np.array([value for bound in (0.5, 1.0, 2.0) for value in draw.uniform(bound, coordinates)], model.dtype)
         q1 = draw.uniform(2.0, n)
         stretch = [value / 1024 for value in draw.uniform(4.0, n)]
         x = np.array(
-            [*q1, *draw.uniform(4.0, n), *(a + b for a, b in zip(q1, stretch, strict=True)), *draw.uniform(4.0, n)],
+            [*q1, *draw.uniform(4.0, n), *(a + b for a, b in zip(q1, stretch, strict=True)), *draw.uniform(4.0, n)][
+                : system.x.numel()
+            ],
             model.dtype,
         )
         u = np.array(draw.uniform(2048.0, n), model.dtype)
-        yield [*base, *x, *u, *_runge_kutta(model, base, x, u)]
+        yield [*base, *x, *u, *_runge_kutta(system.tableau, model, base, x, u)]
 
 
-def _runge_kutta(model: _Model, base: Numbers, x: Numbers, u: Numbers) -> Numbers:
-    """One classical step, operation by operation as in loop.c."""
+def _runge_kutta(tableau: Tableau, model: _Model, base: Numbers, x: Numbers, u: Numbers) -> Numbers:
+    """One step, operation by operation as the C does it."""
     real = model.dtype
-    h = real(TIME_STEP)
-    motion = np.split(base, 3)
-    at, after = x, x
-    for weight, node in ((6, 0.5), (3, 0.5), (3, 1.0), (6, 0.0)):
-        [slope] = model("plant", *motion, at, u)
-        gain, advance = (real(1.0) / real(weight)) * h, real(node) * h
-        after = after + gain * slope
-        at = x + advance * slope
+    h, motion = real(TIME_STEP), np.split(base, 3)
+    slopes: list[Numbers] = []
+    at = after = x
+    for update in updates(tableau):
+        slopes += model("plant", *motion, at, u)
+        if update.next:
+            after = after + (real(update.next) * h) * slopes[-1]
+        at = x
+        for factor, stage in update.at:
+            at = at + (real(factor) * h) * slopes[stage]
     return after

@@ -55,7 +55,12 @@ class Quantity:
         """Its entries for an arm with these joints, in the order of a column vector."""
         if self.per == "joint":
             return tuple(
-                Entry(f"{self.name}_{joint.name}", self.unit.format(q=joint.unit, F=joint.force), self.meaning, joint)
+                Entry(
+                    f"{self.name}_{joint.name}",
+                    self.unit.format(q=joint.unit, F=joint.force),
+                    f"{self.meaning} ({joint.name})",
+                    joint,
+                )
                 for joint in joints
             )
         if self.per == "base":
@@ -81,6 +86,9 @@ Q2 = Quantity("q2", "q_2", "{q}", "motor coordinate, reflected to the joint")
 DQ2 = Quantity("dq2", r"\dot q_2", "{q}/s", "motor rate, reflected to the joint")
 DDQ2 = Quantity("ddq2", r"\ddot q_2", "{q}/s^2", "motor acceleration, reflected to the joint")
 
+DERIVATIVES = {Q1: DQ1, DQ1: DDQ1, Q2: DQ2, DQ2: DDQ2}
+"""Quantity of the state -> its derivative."""
+
 # The reference
 Q1D = Quantity("q1d", r"q_{1d}", "{q}", "reference of the joint coordinate")
 DQ1D = Quantity("dq1d", r"\dot q_{1d}", "{q}/s", "reference of the joint rate")
@@ -99,3 +107,5 @@ E = Quantity("e", "e", "{q}", "tracking error")
 SIGMA = Quantity("sigma", r"\sigma", "{q}/s", "sliding variable")
 U_S = Quantity("U_s", "U_s", "{F}", "slow part of the command, before its limit")
 U_F = Quantity("U_f", "U_f", "{F}", "fast part of the command, before its limit")
+SATURATED = Quantity("saturated", "U = U_{max}", "0 or 1", "whether U_max limits the command")
+A_LIMITED = Quantity("a_limited", "a = a_{max}", "0 or 1", "whether a_max limits the reaching law")

@@ -19,13 +19,14 @@ from springline.model import perturbation, signals
 from springline.model.base import COORDINATES, BaseMotion
 from springline.model.control import K_F, U_MAX, ControlSignals, control, fast_control
 from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
+from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.lagrange import EquationsOfMotion, equations_of_motion
 from springline.model.linear import as_written
 from springline.model.mechanism import Mechanism
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot
-from springline.model.quantities import BASE, DQ1, DQ2, Q1, REFERENCE, U_S, Quantity
+from springline.model.quantities import BASE, DQ1, DQ2, Q1, REFERENCE, U_F, U_S, Quantity
 from springline.model.signals import CONSTANT_ZERO, Signal
 from springline.model.sliding import A_MAX, LAWS, SURFACE_PARAMETERS, LogForm, SurfaceExponents
 
@@ -50,6 +51,7 @@ class Structure:
     """Everything about a system that is no number: a new structure is a new kernel, a new number is not.
 
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
+    effects        properties of sensors and motors, by name, in the order in which they act
     initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
                    told; on the reference they start with springs that carry the arm along it
     """
@@ -64,6 +66,7 @@ class Structure:
     drive: DriveKind = "elastic"
     start: JointStart = "given"
     integrator: str = "rk4"
+    effects: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,6 +266,11 @@ class System:
         }[self.structure.initial_motor]()
         return ca.vertcat(q, dq, motor, ca.SX.zeros(self.n))
 
+    @property
+    def command_parts(self) -> tuple[Quantity, ...]:
+        """What the command is the sum of, before its limit."""
+        return (U_S, U_F) if self.structure.drive == "elastic" else (U_S,)
+
     @cached_property
     def functions(self) -> dict[str, ca.Function]:
         """All Functions, parameters symbolic. Those of the paper's equations first, then the loop's."""
@@ -278,7 +286,8 @@ class System:
             self.structure.log_form,
             self.structure.exponents,
         )
-        dx = self.drive.plant(self.x, self.u, real, self.mechanism, self._plant)
+        applied = actuated(self.structure.effects, self.u)
+        dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant)
         return {
             **self._equations(real, commanded, dx),
             **self._loop(real, commanded, dx),
@@ -346,13 +355,16 @@ class System:
 
     def _loop(self, real: EquationsOfMotion, commanded: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
         """What the simulation loop consists of."""
-        w, x, function, s = self.w, self.x, self._function, commanded
-        computed, names = [s.command, s.error, s.sigma, s.wished], ["u", "e", "sigma", "wished"]
+        w, x, function = self.w, self.x, self._function
+        y = ca.vertcat(*sensed(self.structure.effects, self._state).values())
+        seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished]
+        seen = ca.substitute(seen, [x], [y]) if self.structure.effects else seen
         return {
+            **function("measure", [x], [y], ["x"], ["y"]),
             **function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
             **function("start", [self.t, self.d], [self._start(real)], ["t", "d"], ["x"]),
-            **function("loop_control", [w, x], computed, ["w", "x"], names),
-            **function("loop_error", [w, x], [s.error, s.sigma], ["w", "x"], ["e", "sigma"]),
+            **function("loop_control", [w, x], seen, ["w", "x"], ["u", "e", "sigma", "wished"]),
+            **function("loop_error", [w, x], seen[1:3], ["w", "x"], ["e", "sigma"]),
             **function("loop_plant", [w, x, self.u], [dx], ["w", "x", "u"], ["dx"]),
         }
 

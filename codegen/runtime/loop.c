@@ -30,26 +30,6 @@ enum {
 
 /* ---- signals ------------------------------------------------------------------------------------------- */
 
-/* Table data at time t: per table tau and four coefficients a channel, into d[0], d[stride], ... */
-static void table_data(const sl_table *tables, double t, double *d, int stride) {
-  int i;
-  for (i = 0; i < SL_NTABLES; i++) {
-    const sl_table *table = &tables[i];
-    const double span = (double)table->intervals * table->dt;
-    const double *coefficients;
-    double since = t - table->t0;
-    int64_t k, c;
-    if (table->periodic) since = since - span * sl_floor(since / span);
-    since = sl_fmin(sl_fmax(since, 0.0), span);
-    k = (int64_t)sl_floor(since / table->dt);
-    if (k >= table->intervals) k = table->intervals - 1;
-    coefficients = table->coefficients + 4 * table->channels * k;
-    *d = since - (double)k * table->dt;
-    d += stride;
-    for (c = 0; c < 4 * table->channels; c++, d += stride) *d = coefficients[c];
-  }
-}
-
 typedef struct {
   const sl_job *job;
   sl_v uniform[2][SL_BLOCK / SL_W][SL_NU + 1]; /* two blocks of instants, a lane each: those of a step are in no more */
@@ -73,7 +53,7 @@ static const double *uniform_at(sl_clock *clock, int64_t j) {
       double t[SL_W], d[SL_W * (SL_ND + 1)] = {0.0}; /* without tables nothing reads d */
       for (i = 0; i < SL_W; i++) {
         t[i] = instant_time(clock->job, block * SL_BLOCK + part * SL_W + i);
-        table_data(clock->job->tables, t[i], d + i, SL_W);
+        sl_table_data(clock->job->tables, SL_NTABLES, t[i], d + i, SL_W);
       }
       kernel_uniform(t, d, clock->uniform[slot][part]);
     }
@@ -114,7 +94,7 @@ static sl_time time_at(sl_pack *pack, int64_t j, sl_group *varying) {
   if (SL_NV > 0) {
     double d[SL_ND + 1] = {0.0}; /* likewise */
     const double t = instant_time(pack->job, j);
-    table_data(pack->job->tables, t, d, 1);
+    sl_table_data(pack->job->tables, SL_NTABLES, t, d, 1);
     kernel_varying(t, d, now.uniform, (const sl_group *)pack->p, (const sl_group *)pack->r, varying);
   }
   return now;
@@ -290,7 +270,7 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
     if (lane < pack->lanes && job->rows) job->rows[run] = 0;
   }
   kernel_run((const sl_group *)pack->p, pack->r);
-  table_data(job->tables, job->start_time, d, 1);
+  sl_table_data(job->tables, SL_NTABLES, job->start_time, d, 1);
   kernel_start(job->start_time, d, (const sl_group *)pack->p, (const sl_group *)pack->r, pack->x);
   pack->times[0].varying = (const sl_group *)pack->varying[0];
   pack->times[SL_INSTANTS] = time_at(pack, 0, pack->varying[SL_INSTANTS]);

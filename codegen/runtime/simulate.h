@@ -9,15 +9,7 @@
 
 #include <stdint.h>
 
-/* Table signal on uniform knots: knot k stands at t0 + k dt; coefficients[k][channel][4] of the cubic on interval k. */
-typedef struct {
-  double t0;                  /* s */
-  double dt;                  /* s */
-  int64_t intervals;          /* number of knot intervals */
-  int64_t channels;           /* columns with data */
-  int64_t periodic;           /* 1: t is wrapped into the table, 0: t is clamped to it */
-  const double *coefficients; /* intervals x channels x 4, c0 + c1 tau + c2 tau^2 + c3 tau^3 */
-} sl_table;
+#include "sl_tables.h"
 
 typedef struct {
   int64_t first, last;          /* the runs of this call */

@@ -9,8 +9,8 @@ enum { STEPS_PER_SAMPLE = 10, SAMPLES_PER_ROW = 10 };
 
 static const springline_real STEP = 1e-4{{f}};
 
-/* Time of half plant step j; never accumulated. */
-static springline_real half_step_time(long j) { return (0.5{{f}} * (springline_real)j) * STEP; }
+/* Time of plant step j, or of a part of the way to the next; never accumulated. */
+static springline_real time_of(long j, springline_real part) { return ((springline_real)j + part) * STEP; }
 
 static void print_row(springline_real t, const springline_reference *reference, const springline_state *state,
                       const springline_command *command) {
@@ -26,24 +26,23 @@ int main(int argc, char **argv) {
   springline_measurement measurement;
   springline_reference reference;
   springline_command command;
-  springline_base base[3];
+  springline_base base[SPRINGLINE_BASE_NODES];
   long k;
   int i, j;
   int status = springline_init(&controller, &springline_default_config);
   if (status == SPRINGLINE_OK) status = springline_start(&controller, &state);
 {{table_warning}}  printf("{{csv_header}}\n");
   for (k = 0; k <= samples && status == SPRINGLINE_OK; k++) {
-    const long first = 2L * STEPS_PER_SAMPLE * k; /* in half steps */
-    status = springline_signals(&controller, half_step_time(first), &reference, &base[0]);
+    const long first = STEPS_PER_SAMPLE * k; /* in plant steps */
+    status = springline_signals(&controller, time_of(first, 0.0{{f}}), &reference, &base[0]);
+    if (status == SPRINGLINE_OK) status = springline_measure(&controller, &state, &measurement);
     if (status != SPRINGLINE_OK) break;
-{{measure}}
     status = springline_step(&controller, &reference, &measurement, &command, NULL);
     if (status != SPRINGLINE_OK) break;
-    if (k % SAMPLES_PER_ROW == 0) print_row(half_step_time(first), &reference, &state, &command);
+    if (k % SAMPLES_PER_ROW == 0) print_row(time_of(first, 0.0{{f}}), &reference, &state, &command);
     for (j = 0; j < STEPS_PER_SAMPLE && status == SPRINGLINE_OK; j++) {
-      for (i = 0; i < 3; i++) {
-        status = springline_signals(&controller, half_step_time(first + 2L * j + i), &reference, &base[i]);
-        if (status != SPRINGLINE_OK) break;
+      for (i = 0; i < SPRINGLINE_BASE_NODES && status == SPRINGLINE_OK; i++) {
+        status = springline_signals(&controller, time_of(first + j, springline_base_nodes[i]), &reference, &base[i]);
       }
       if (status == SPRINGLINE_OK) status = springline_plant_step(&controller, &state, &command, base, STEP);
     }

@@ -119,11 +119,11 @@ static int replay_plant(const springline_controller *controller, long line, cons
                         const springline_real *expected) {
   springline_state state;
   springline_command command;
-  springline_base base[3];
+  springline_base base[SPRINGLINE_BASE_NODES];
   springline_real got[PLANT_OUT];
-  int status;
+  int status, i;
 {{plant_from_vector}}
-  base[2] = base[1] = base[0];
+  for (i = 1; i < SPRINGLINE_BASE_NODES; i++) base[i] = base[0];
   status = springline_plant_step(controller, &state, &command, base, plant_time_step);
   if (status != SPRINGLINE_OK) {
     printf("line %ld: springline_plant_step: %s\n", line, springline_status_text(status));

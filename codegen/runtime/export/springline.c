@@ -3,10 +3,12 @@
 #include <stddef.h>
 
 #include "{{math_header}}"
-
+{{tables}}
 enum { SPRINGLINE_READY = 0x5a17 }; /* springline_init has been here */
 
 const springline_config springline_default_config = {{default_config}};
+
+const springline_real springline_base_nodes[SPRINGLINE_BASE_NODES] = {{base_node_values}};
 
 static const springline_command springline_no_command = {{zero_command}};
 static const springline_diagnostics springline_no_diagnostics = {{zero_diagnostics}};
@@ -140,36 +142,30 @@ int springline_step(springline_controller *controller, const springline_referenc
 
 int springline_plant_step(const springline_controller *controller, springline_state *state,
                           const springline_command *command, const springline_base *base, springline_real step) {
-  static const springline_real node[4] = {0.0{{f}}, 0.5{{f}}, 0.5{{f}}, 1.0{{f}}};
-  static const springline_real weight[4] = {1.0{{f}} / 6.0{{f}}, 1.0{{f}} / 3.0{{f}}, 1.0{{f}} / 3.0{{f}},
-                                            1.0{{f}} / 6.0{{f}}};
-  static const int when[4] = {0, 1, 1, 2};
-  springline_real x[{{states}}], at[{{states}}], next[{{states}}], slope[{{states}}];
-  int stage, i;
+  const springline_base *motion[SPRINGLINE_BASE_NODES];
+  springline_real x[{{states}}], at[{{states}}], next[{{states}}]{{slopes}};
+  int i;
   if (controller == NULL || state == NULL || command == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
   if (!springline_is_finite(step) || step <= 0.0{{f}}) return SPRINGLINE_BAD_PLANT_INPUT;
   if (!springline_command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
-  for (i = 0; base != NULL && i < 3; i++) {
-    if (!springline_base_is_finite(&base[i])) return SPRINGLINE_BAD_PLANT_INPUT;
+  for (i = 0; i < SPRINGLINE_BASE_NODES; i++) {
+    motion[i] = base != NULL ? &base[i] : &springline_base_at_rest;
+    if (!springline_base_is_finite(motion[i])) return SPRINGLINE_BAD_PLANT_INPUT;
   }
 {{state_to_x}}
   if (!springline_state_is_finite(x)) return SPRINGLINE_BAD_PLANT_INPUT;
-  for (i = 0; i < {{states}}; i++) {
-    at[i] = x[i];
-    next[i] = x[i];
-  }
-  for (stage = 0; stage < 4; stage++) {
-    const springline_real advance = stage < 3 ? node[stage + 1] * step : 0.0{{f}}, gain = weight[stage] * step;
-    const springline_base *motion = base != NULL ? &base[when[stage]] : &springline_base_at_rest;
-    springline_evaluate_plant(controller, motion, at, command, slope);
-    for (i = 0; i < {{states}}; i++) {
-      next[i] = next[i] + gain * slope[i];
-      at[i] = x[i] + advance * slope[i];
-    }
-  }
+{{plant_stages}}
   if (!springline_state_is_finite(next)) return SPRINGLINE_DIVERGED;
 {{next_to_state}}
+  return SPRINGLINE_OK;
+}
+
+int springline_measure(const springline_controller *controller, springline_state *state,
+                       springline_measurement *measurement) {
+  if (controller == NULL || state == NULL || measurement == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+{{measure}}
   return SPRINGLINE_OK;
 }
 

@@ -90,11 +90,21 @@ int springline_step(springline_controller *controller, const springline_referenc
                     const springline_measurement *measurement, springline_command *command,
                     springline_diagnostics *diagnostics);
 
-/* The plant, for tests and hardware in the loop: state after `step` seconds (classical Runge-Kutta, one step; take 1e-4)
- * under a constant command. base[0], base[1], base[2] are the base's motion at the start, the middle and the end of the
- * step; base = NULL for a base at rest. If it fails *state is left as it was. */
+/* When a plant step needs the base's motion, in parts of the step: 0 is its start, 1 its end. */
+#define SPRINGLINE_BASE_NODES {{base_nodes}}
+extern const springline_real springline_base_nodes[SPRINGLINE_BASE_NODES];
+
+/*
+ * The plant, for tests and hardware in the loop: state after `step` seconds ({{integrator}}, one step; take 1e-4) under a
+ * constant command. base[i] is the base's motion at springline_base_nodes[i]; base = NULL for a base at rest. If it fails
+ * *state is left as it was.
+ */
 int springline_plant_step(const springline_controller *controller, springline_state *state,
                           const springline_command *command, const springline_base *base, springline_real step);
+
+/* What the sensors show of the plant's state, one sample of it. */
+int springline_measure(const springline_controller *controller, springline_state *state,
+                       springline_measurement *measurement);
 
 /* The plant's initial state. */
 int springline_start(const springline_controller *controller, springline_state *state);

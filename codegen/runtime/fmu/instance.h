@@ -294,7 +294,7 @@ static const char *fmu_impossible(const fmu_state *state) {
   if (state->step < 0 || state->step > most) return "its count of steps";
   if (state->between != 0 && state->between != 1) return "its mark of a time between steps";
   if (FMU_GRID > 0.0) {
-    const double last = fmu_grid_time(2 * state->step), next = fmu_grid_time(2 * state->step + 2);
+    const double last = fmu_grid_time(state->step, 0.0), next = fmu_grid_time(state->step + 1, 0.0);
     if (state->between ? !(last < state->time && state->time < next) : state->time != last) return "its place in a step";
   } else if (state->step != 0 || state->between != 0) {
     return "its place in a step";

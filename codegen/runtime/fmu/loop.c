@@ -8,7 +8,11 @@ enum { FMU_CURRENT = 2 * FMU_JOINTS }; /* the diagnostics e and sigma come first
 static int fmu_control(fmu_core *fmu, const springline_reference *reference, const double *x,
                        springline_command *command, springline_diagnostics *diagnostics) {
   springline_measurement measurement;
-  fmu_measure(x, &measurement);
+  springline_state state;
+  int status;
+  fmu_get_state(x, &state);
+  status = springline_measure(&fmu->controller, &state, &measurement);
+  if (status != SPRINGLINE_OK) return status;
   return springline_step(&fmu->controller, reference, &measurement, command, diagnostics);
 }
 
@@ -40,11 +44,11 @@ static int fmu_evaluate(fmu_core *fmu) {
 
 static int fmu_move(fmu_core *fmu, const fmu_interval *interval, double *x) {
   springline_reference reference;
-  springline_base base[3];
+  springline_base base[SPRINGLINE_BASE_NODES];
   springline_command command;
   springline_state state;
   int status = fmu_evaluate(fmu), i; /* a new sample where one is due */
-  for (i = 0; i < 3 && status == SPRINGLINE_OK; i++) {
+  for (i = 0; i < SPRINGLINE_BASE_NODES && status == SPRINGLINE_OK; i++) {
     status = fmu_surroundings(fmu, interval->t[i], &reference, &base[i]);
   }
   if (status != SPRINGLINE_OK) return status;
@@ -57,33 +61,17 @@ static int fmu_move(fmu_core *fmu, const fmu_interval *interval, double *x) {
 
 #else
 
-/* One classical Runge-Kutta step, operation by operation that of the simulation loop. */
 static int fmu_move(fmu_core *fmu, const fmu_interval *interval, double *x) {
-  static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
-  static const int when[4] = {0, 1, 1, 2};
-  const double h = interval->length;
-  springline_reference reference[3];
-  springline_base base[3];
-  double start[FMU_STATES], at[FMU_STATES], slope[FMU_STATES];
-  int status = SPRINGLINE_OK, stage, i;
-  for (i = 0; i < 3 && status == SPRINGLINE_OK; i++) {
+  springline_reference reference[SPRINGLINE_BASE_NODES];
+  springline_base base[SPRINGLINE_BASE_NODES];
+  double start[FMU_STATES];
+  int status = SPRINGLINE_OK, i;
+  for (i = 0; i < SPRINGLINE_BASE_NODES && status == SPRINGLINE_OK; i++) {
     status = fmu_surroundings(fmu, interval->t[i], &reference[i], &base[i]);
   }
+  if (status != SPRINGLINE_OK) return status;
   memcpy(start, x, sizeof start);
-  memcpy(at, x, sizeof at);
-  for (stage = 0; stage < 4 && status == SPRINGLINE_OK; stage++) {
-    const double advance = stage < 3 ? node[stage + 1] * h : 0.0, gain = weight[stage] * h;
-    springline_command command;
-    springline_diagnostics diagnostics;
-    status = fmu_control(fmu, &reference[when[stage]], at, &command, &diagnostics);
-    if (status != SPRINGLINE_OK) return status;
-    fmu_slope(fmu->now.values + FMU_AT_PARAMETERS, &base[when[stage]], at, &command, slope);
-    for (i = 0; i < FMU_STATES; i++) {
-      x[i] = x[i] + gain * slope[i];
-      at[i] = start[i] + advance * slope[i];
-    }
-  }
-  return status;
+  return fmu_closed_step(fmu, reference, base, start, x, interval->length);
 }
 
 #endif

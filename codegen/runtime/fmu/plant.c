@@ -15,11 +15,11 @@ static int fmu_evaluate(fmu_core *fmu) {
 
 static int fmu_move(fmu_core *fmu, const fmu_interval *interval, double *x) {
   springline_reference reference;
-  springline_base base[3];
+  springline_base base[SPRINGLINE_BASE_NODES];
   springline_command command;
   springline_state state;
   int status = SPRINGLINE_OK, i;
-  for (i = 0; i < 3 && status == SPRINGLINE_OK; i++) {
+  for (i = 0; i < SPRINGLINE_BASE_NODES && status == SPRINGLINE_OK; i++) {
     status = fmu_surroundings(fmu, interval->t[i], &reference, &base[i]);
   }
   if (status != SPRINGLINE_OK) return status;

@@ -41,12 +41,12 @@ typedef struct {
 
 /* A step of the integrator. */
 typedef struct {
-  double t[3]; /* start, middle, end */
+  double t[SPRINGLINE_BASE_NODES]; /* when it needs the signals */
   double length;
 } fmu_interval;
 
-/* Time of half grid step j, as in the simulation loop: never accumulated. */
-static double fmu_grid_time(int64_t j) { return (0.5 * (double)j) * FMU_GRID; }
+/* Time of grid point k, or of a part of the way to the next, as in the simulation loop: never accumulated. */
+static double fmu_grid_time(int64_t k, double part) { return ((double)k + part) * FMU_GRID; }
 
 /* From |t| to the next double. */
 static double fmu_spacing(double t) {
@@ -86,7 +86,7 @@ static fmu_place fmu_destination(const fmu_state *now, double length, double unt
     const double nearest = sl_floor(time / FMU_GRID + 0.5);
     if (sl_fabs(time - nearest * FMU_GRID) <= tolerance) {
       place.step = (int64_t)nearest;
-      place.time = fmu_grid_time(2 * place.step);
+      place.time = fmu_grid_time(place.step, 0.0);
     } else {
       place.step = (int64_t)sl_floor(time / FMU_GRID);
       place.between = 1;

@@ -15,13 +15,14 @@ static int fmu_begin(fmu_core *fmu) {
 static int fmu_go(fmu_core *fmu, const fmu_place *to) {
   const fmu_state *now = &fmu->now;
   double *x = fmu->now.values + FMU_AT_STATE, next[FMU_STATES];
-  fmu_interval interval = {{now->time, 0.0, to->time}, FMU_GRID};
+  const int whole = !now->between && !to->between;
+  fmu_interval interval;
   int status, i;
-  if (now->between || to->between) {
-    interval.length = to->time - now->time;
-    interval.t[1] = now->time + 0.5 * interval.length;
-  } else {
-    interval.t[1] = fmu_grid_time(2 * now->step + 1);
+  interval.length = whole ? FMU_GRID : to->time - now->time;
+  for (i = 0; i < SPRINGLINE_BASE_NODES; i++) {
+    const double node = springline_base_nodes[i];
+    interval.t[i] = whole ? fmu_grid_time(now->step, node) : now->time + node * interval.length;
+    if (node >= 1.0) interval.t[i] = to->time;
   }
   memcpy(next, x, sizeof next);
   status = fmu_move(fmu, &interval, next);
@@ -37,7 +38,7 @@ static int fmu_go(fmu_core *fmu, const fmu_place *to) {
 static int fmu_advance(fmu_core *fmu, const fmu_place *to) {
   int status = SPRINGLINE_OK;
   while (status == SPRINGLINE_OK && fmu->now.step < to->step) {
-    const fmu_place grid = {fmu_grid_time(2 * (fmu->now.step + 1)), fmu->now.step + 1, 0};
+    const fmu_place grid = {fmu_grid_time(fmu->now.step + 1, 0.0), fmu->now.step + 1, 0};
     status = fmu_go(fmu, &grid);
   }
   if (status == SPRINGLINE_OK && fmu->now.time < to->time) status = fmu_go(fmu, to);
