@@ -180,6 +180,11 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     return Result(trajectory, metrics_table(system.joints, runs), status, message)
 
 
+def row_size(scenario: Scenario) -> int:
+    """Bytes of the numbers in a trajectory row."""
+    return 8 * len(trajectory_schema(scenario.system()))
+
+
 def refuse_rows(scenario: Scenario, most: int, why: str) -> None:
     """Raise InputError if the trajectory has more rows than `most`; `why` says what sets this limit."""
     rows = loop_settings(scenario, trajectory=True).rows
@@ -192,8 +197,10 @@ def refuse_rows(scenario: Scenario, most: int, why: str) -> None:
 def _refuse_large(scenario: Scenario) -> None:
     """Raise InputError if the trajectory, with the copies that become tables and files, would not fit into memory."""
     refuse_rows(scenario, _MOST_ROWS, "the most of a trajectory")
-    there, row = memory(), 8 * len(trajectory_schema(scenario.system()))
-    refuse_rows(scenario, there // (_COPIES * row), f"all that {there / 1e9:.3g} GB of memory have room for")
+    there = memory()
+    refuse_rows(
+        scenario, there // (_COPIES * row_size(scenario)), f"all that {there / 1e9:.3g} GB of memory have room for"
+    )
 
 
 def _watched(
