@@ -167,7 +167,7 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     expect_scenario(scenario)
     if engine not in get_args(Engine):
         raise ValueError(f"engine is {engine!r}, expected one of {', '.join(get_args(Engine))}")
-    _refuse_large(scenario)
+    refuse_large(scenario)
     loop = kernel(scenario.structure(), scenario.control_every > 0, replace(ONE_RUN, engine=engine))
     settings = loop_settings(scenario, trajectory=True)
     tables = kernel_tables(scenario.tables())
@@ -194,7 +194,7 @@ def refuse_rows(scenario: Scenario, most: int, why: str) -> None:
         raise InputError(Problem(scenario.source, "simulation.output_every", text, str(scenario.output_every)))
 
 
-def _refuse_large(scenario: Scenario) -> None:
+def refuse_large(scenario: Scenario) -> None:
     """Raise InputError if the trajectory, with the copies that become tables and files, would not fit into memory."""
     refuse_rows(scenario, _MOST_ROWS, "the most of a trajectory")
     there = memory()

@@ -4,7 +4,7 @@ of a sweep side by side.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,8 +33,8 @@ _BINS = 40
 _POINTS = 800
 _STOPPED = "#D55E00"
 _NEVER = "0.75"
-_HATCH = {"facecolor": "none", "edgecolor": "white", "hatch": "//////", "linewidth": 0.0}
-_RING = {"markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.7}
+_HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": "white", "hatch": "//////", "linewidth": 0.0}
+_RING: Mapping[str, Any] = {"markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.7}
 
 
 @dataclass(frozen=True)

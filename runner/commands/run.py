@@ -77,7 +77,7 @@ def run(
     folder = output or Path("results", scenario if packaged else Path(scenario).stem)
     refuse_occupied(folder, force=force)
     _refuse_own_inputs(folder, scenario, loaded)
-    _refuse_full_disk(folder, loaded, form)
+    _refuse_too_large(folder, loaded, form)
     with progress(f"simulating {scenario}", quiet=as_json) as report:
         result = simulate(loaded, engine=engine.value, progress=report)
     files = {"scenario.toml": loaded.to_toml().encode()}
@@ -124,10 +124,11 @@ def _refuse_own_inputs(folder: Path, source: str, scenario: Scenario) -> None:
         )
 
 
-def _refuse_full_disk(folder: Path, scenario: Scenario, form: Format) -> None:
-    """Raise InputError if the trajectory will not fit on the disk of `folder`; all else is small beside it."""
-    from springline.runner.simulate import refuse_rows, row_size
+def _refuse_too_large(folder: Path, scenario: Scenario, form: Format) -> None:
+    """Raise InputError if the trajectory does not fit memory or the disk of `folder`; all else is small."""
+    from springline.runner.simulate import refuse_large, refuse_rows, row_size
 
+    refuse_large(scenario)
     place = next(place for place in (folder, *folder.resolve().parents) if place.exists())
     free = shutil.disk_usage(place).free
     row = row_size(scenario) if form is Format.parquet else round(_TEXT_SIZE * row_size(scenario))

@@ -200,6 +200,24 @@ def test_chatter_is_the_rate_of_full_swings(shaken: Program, values_of: Values) 
     assert rotation == 0.0
 
 
+def test_ripple_far_below_the_largest_command_is_no_chatter(shaken: Program, values_of: Values) -> None:
+    """Swings of 30 Hz that are damped to 6e-6 of their size when the second half begins."""
+    w, damping = 2.0 * math.pi * 30.0, 12.0
+    values = values_of(shaken, {**STILL, "initial.dq.0": 0.0, "control.K_f.0": 1e9, "control.K_f.1": 0.0})
+    damped = with_plant(
+        shaken,
+        lambda x: ca.vertcat(ca.SX.zeros(4), w * x[6] - damping * x[4], ca.SX(0), -w * x[4] - damping * x[6], ca.SX(0)),
+    )
+    settings = LoopSettings(20_000, 1e-4, output_every=1)
+    result = run(damped, values, settings)
+    assert result.trajectory is not None
+    chatter = result.metrics[0, 0, METRICS.index("chatter")]
+    u = result.trajectory[0, :, 15]
+    assert np.ptp(u[10_000:]) < 1e-4 * np.abs(u).max()
+    assert chatter == pytest.approx(np.abs(np.diff(u[10_000:])).sum() / 1.0 / (1e-3 * np.abs(u).max()), rel=1e-9)
+    assert chatter < 1.0
+
+
 def test_iae_of_a_run_that_stops_ends_where_it_does(shaken: Program, values_of: Values) -> None:
     """e grows at 3 m/s, so that its integral up to t is known; a step has a quarter of it."""
     values = values_of(shaken, {**STILL, "initial.q.0": 1.0})
