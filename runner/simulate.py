@@ -23,6 +23,7 @@ from springline.codegen.kernel import (
     LoopSettings,
     Runs,
     Table,
+    chatters,
     kernel,
     quantity_name,
 )
@@ -151,8 +152,9 @@ def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tup
 
 def _chatter_text(joints: Sequence[Joint], runs: Runs, run: int) -> str:
     """Of a run that chatters, which command does it and how much; "" for a calm one."""
-    chatter = zip(joints, runs.metrics[run, :, METRICS.index("chatter")], strict=True)
-    found = [f"U_{joint.name} by {value:.3g} 1/s" for joint, value in chatter if value > CHATTERING]
+    chatter = runs.metrics[run, :, METRICS.index("chatter")]
+    judged = zip(joints, chatter, chatters(chatter, runs.end_time[run]), strict=True)
+    found = [f"U_{joint.name} by {value:.3g} 1/s" for joint, value, does in judged if does]
     return f"; chattering: {' and '.join(found)} (calm is up to {CHATTERING:g})" if found else ""
 
 

@@ -16,7 +16,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import compute
 
-from springline.codegen.kernel import CHATTERING, METRICS, STATUS
+from springline.codegen.kernel import CHATTERING, METRICS, STATUS, chatters
 from springline.model.parameters import Joint
 from springline.runner import sampling
 from springline.runner.dataset import Dataset
@@ -132,7 +132,8 @@ def _numbers(table: pa.Table, column: str) -> Floats:
 
 def chattering(table: pa.Table, joints: Sequence[Joint]) -> NDArray[np.bool_]:
     """Which runs chatter, on any joint; a run that stopped does not."""
-    columns = [_numbers(table, f"chatter_{joint.name}") > CHATTERING for joint in joints]
+    end = _numbers(table, "t_end")
+    columns = [chatters(_numbers(table, f"chatter_{joint.name}"), end) for joint in joints]
     return np.asarray(np.any(columns, axis=0), dtype=np.bool_)
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from springline.codegen.kernel import METRICS, MOST_STEPS
+from springline.codegen.kernel import METRICS, MOST_STEPS, LoopSettings, Runs
 from springline.runner.cli import app
 from springline.runner.errors import InputError
 from springline.runner.scenario import load_scenario
-from springline.runner.simulate import metrics_schema, simulate
+from springline.runner.simulate import metrics_schema, outcome, simulate
 
 
 def springline(*arguments: str | Path) -> Result:
@@ -74,12 +74,28 @@ def test_chatter_tells_swinging_commands_from_clean_ones(
     assert shown.stdout.splitlines()[-1] == result.message
 
 
-def test_one_commands_chatter_is_not_put_down_to_the_other() -> None:
-    """K_f far too high on the rotation alone."""
-    result = simulate(load_scenario("paper/nominal", {"control.delta": 0.021, "control.mu.0": 1.0}))
-    (row,) = result.metrics.to_pylist()
-    for joint in ("lift", "rotation"):
-        assert (f"U_{joint} by" in result.message) == (row[f"chatter_{joint}"] > 20.0)
+@pytest.mark.parametrize("duration", [0.02, 0.1, 0.2])
+def test_the_one_swing_of_a_short_run_is_no_chatter(duration: float) -> None:
+    result = simulate(load_scenario("paper/group1_shake", {"simulation.duration": duration}))
+    assert result.metrics["chatter_lift"][0].as_py() > 1.9 / duration, "about one swing in half of it"
+    assert "chattering" not in result.message
+
+
+@pytest.mark.parametrize(
+    ("chatter", "told"),
+    [
+        ((20.1, 19.9), "; chattering: U_lift by 20.1 1/s (calm is up to 20)"),
+        ((0.0, 300.0), "; chattering: U_rotation by 300 1/s (calm is up to 20)"),
+        ((np.nan, 20.0), ""),
+    ],
+)
+def test_only_the_command_that_chatters_is_named(chatter: tuple[float, float], told: str) -> None:
+    metrics = np.full((1, 2, len(METRICS)), np.nan)
+    metrics[0, :, METRICS.index("chatter")] = chatter
+    none = np.zeros(1, np.int32)
+    runs = Runs(metrics, np.zeros((1, 8)), np.array([1.0]), none, none - 1)
+    system = load_scenario("paper/nominal").system()
+    assert outcome(system, runs, 0, LoopSettings(1000, 1e-3)) == ("ok", f"done: 1 s in 1000 steps{told}")
 
 
 @pytest.mark.parametrize("engine", ["lanes", "casadi"])
