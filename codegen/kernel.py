@@ -36,6 +36,7 @@ __all__ = [
     "LoopSettings",
     "Runs",
     "Table",
+    "chatters",
     "compile_kernel",
     "joined",
     "kernel",
@@ -65,7 +66,8 @@ ROW = ("q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U")
 """Quantities of each joint, in the order of a trajectory row: they follow t, and the base coordinates follow them."""
 
 CHATTERING = 20.0
-"""1/s: a run whose `chatter` is larger on any joint chatters. Clean ones have 0 to 1.3."""
+"""1/s: a command whose `chatter` is larger chatters. Clean runs have 0 to 1.3."""
+_SWINGS = 4.0  # so many at least, or the one swing of a run that lasts no time would be taken for many in a second
 
 MOST_STEPS = 2**53
 """Steps are counted in doubles too, and these hold no more whole numbers without a gap."""
@@ -341,6 +343,14 @@ def _checked_layout(layout: Any, *expected: int) -> int:
     if wrong:
         raise LayoutError(f"loop.c and kernel.py do not fit together ({'; '.join(wrong)}): install springline anew")
     return int(sizes[0])
+
+
+def chatters(chatter: Floats, duration: Floats | float) -> NDArray[np.bool_]:
+    """Which commands chatter: they go to and fro often in a second, and more than twice in the half that was looked at.
+
+    chatter   the metric, 1/s;  duration  of the runs, s
+    """
+    return np.asarray((chatter > CHATTERING) & (chatter * (np.asarray(duration) / 2.0) > _SWINGS), dtype=np.bool_)
 
 
 def quantity_name(joints: Sequence[Joint], quantity: int) -> str:

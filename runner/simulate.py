@@ -23,6 +23,7 @@ from springline.codegen.kernel import (
     LoopSettings,
     Runs,
     Table,
+    chatters,
     kernel,
     quantity_name,
 )
@@ -151,8 +152,9 @@ def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tup
 
 def _chatter_text(joints: Sequence[Joint], runs: Runs, run: int) -> str:
     """Of a run that chatters, which command does it and how much; "" for a calm one."""
-    chatter = zip(joints, runs.metrics[run, :, METRICS.index("chatter")], strict=True)
-    found = [f"U_{joint.name} by {value:.3g} 1/s" for joint, value in chatter if value > CHATTERING]
+    chatter = runs.metrics[run, :, METRICS.index("chatter")]
+    judged = zip(joints, chatter, chatters(chatter, runs.end_time[run]), strict=True)
+    found = [f"U_{joint.name} by {value:.3g} 1/s" for joint, value, does in judged if does]
     return f"; chattering: {' and '.join(found)} (calm is up to {CHATTERING:g})" if found else ""
 
 
@@ -167,7 +169,7 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     expect_scenario(scenario)
     if engine not in get_args(Engine):
         raise ValueError(f"engine is {engine!r}, expected one of {', '.join(get_args(Engine))}")
-    _refuse_large(scenario)
+    refuse_large(scenario)
     loop = kernel(scenario.structure(), scenario.control_every > 0, replace(ONE_RUN, engine=engine))
     settings = loop_settings(scenario, trajectory=True)
     tables = kernel_tables(scenario.tables())
@@ -180,6 +182,11 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     return Result(trajectory, metrics_table(system.joints, runs), status, message)
 
 
+def row_size(scenario: Scenario) -> int:
+    """Bytes of the numbers in a trajectory row."""
+    return 8 * len(trajectory_schema(scenario.system()))
+
+
 def refuse_rows(scenario: Scenario, most: int, why: str) -> None:
     """Raise InputError if the trajectory has more rows than `most`; `why` says what sets this limit."""
     rows = loop_settings(scenario, trajectory=True).rows
@@ -189,11 +196,13 @@ def refuse_rows(scenario: Scenario, most: int, why: str) -> None:
         raise InputError(Problem(scenario.source, "simulation.output_every", text, str(scenario.output_every)))
 
 
-def _refuse_large(scenario: Scenario) -> None:
+def refuse_large(scenario: Scenario) -> None:
     """Raise InputError if the trajectory, with the copies that become tables and files, would not fit into memory."""
     refuse_rows(scenario, _MOST_ROWS, "the most of a trajectory")
-    there, row = memory(), 8 * len(trajectory_schema(scenario.system()))
-    refuse_rows(scenario, there // (_COPIES * row), f"all that {there / 1e9:.3g} GB of memory have room for")
+    there = memory()
+    refuse_rows(
+        scenario, there // (_COPIES * row_size(scenario)), f"all that {there / 1e9:.3g} GB of memory have room for"
+    )
 
 
 def _watched(

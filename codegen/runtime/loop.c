@@ -129,8 +129,8 @@ static void finish_lane(sl_pack *pack, int lane, int64_t k, enum sl_status statu
   int i;
   for (i = 0; i < SL_NX; i++) job->final_state[run * SL_NX + i] = lane_of(pack->x[i], lane);
   for (i = 0; i < SL_NJ; i++) {
-    sl_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, job->start_time, half, end, status == SL_OK,
-                      job->metrics + run * SL_NMETRICS + i * SL_METRICS_PER_JOINT);
+    sl_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, job->start_time, end, job->step, half,
+                      status == SL_OK, job->metrics + run * SL_NMETRICS + i * SL_METRICS_PER_JOINT);
   }
   job->end_time[run] = end;
   job->status[run] = (int32_t)status;
@@ -192,8 +192,7 @@ SL_RARE void stop_overflows(sl_pack *pack, int64_t k, sl_time now) {
 static void observe(sl_pack *pack, int64_t k, sl_time now) {
   const sl_job *job = pack->job;
   const int64_t middle = job->steps / 2;
-  const sl_instant instant = {step_time(job, k), k > 0 ? job->step : 0.0, (k >= middle) + (k > middle),
-                              4 * k >= 3 * job->steps};
+  const sl_instant instant = {step_time(job, k), k == middle, k > middle, 4 * k >= 3 * job->steps};
   int i, g;
   for (i = 0; k == 0 && i < SL_NJ; i++) {
     for (g = 0; g < SL_G; g++) {
