@@ -195,14 +195,14 @@ def _load_table(
 def _expect_overlap(read: Table, table: Mapping[str, Any], name: str, duration: float, where: str) -> str:
     """A note on the span of the record that a run of `duration` s uses. Raises InputError if there is none."""
     t0, path = table["t0"], table["path"]
-    lasts = f"{path} lasts from {read.t0 + t0:.12g} to {read.end + t0:.12g} s"
-    wanted = f"{t0:.12g} to {t0 + duration:.12g} s"
+    lasts = f"{path} lasts from {read.t0 + t0:.15g} to {read.end + t0:.15g} s"
+    wanted = f"{t0:.15g} to {t0 + duration:.15g} s"
     if read.ends == "periodic":
-        return f"{name}: {path} repeats every {read.end - read.t0:.12g} s, and the run begins at its {t0:.12g} s"
+        return f"{name}: {path} repeats every {read.end - read.t0:.15g} s, and the run begins at its {t0:.15g} s"
     if not read.touches(duration):
         text = (
             f"{lasts} and the run takes {wanted} of it, which is outside: expected the record's time at run time 0 "
-            f"(t0 = {read.t0 + t0!r} starts the run with the record; units.t says what its times are in)"
+            f"(t0 = {read.t0 + t0:.15g} starts the run with the record; units.t says what its times are in)"
         )
         raise InputError(Problem(where, f"{name}.t0", text, f"{t0!r} s"))
     if not read.covers(duration):
@@ -214,5 +214,5 @@ def _expect_overlap(read: Table, table: Mapping[str, Any], name: str, duration: 
     if read.end < duration - read.dt * _WHOLE:
         note += f"; after it the motion comes to rest at the last value, {after:.4g} s later"
     if duration < read.dt:
-        note += f": less than one of its sample intervals of {read.dt:.12g} s (is units.t right?)"
+        note += f": less than one of its sample intervals of {read.dt:.15g} s (is units.t right?)"
     return note
