@@ -210,9 +210,9 @@ def _expect_overlap(read: Table, table: Mapping[str, Any], name: str, duration: 
     note = f"{name}: {lasts}, and the run takes {wanted} of it"
     before, after = (read.dt * (len(intervals) - 1) for intervals in read.rests())
     if read.t0 > read.dt * _WHOLE:
-        note += f"; before it the motion starts from rest at the first value, {before:.4g} s earlier"
+        note += f"; before the record the motion starts from rest at its first value, {before:.4g} s earlier"
     if read.end < duration - read.dt * _WHOLE:
-        note += f"; after it the motion comes to rest at the last value, {after:.4g} s later"
+        note += f"; after the record the motion comes to rest at its last value, {after:.4g} s later"
     if duration < read.dt:
         note += f": less than one of its sample intervals of {read.dt:.15g} s (is units.t right?)"
     return note
