@@ -150,7 +150,7 @@ def spline(t0: float, dt: float, samples: Floats, ends: Ends) -> Table:
     with np.errstate(over="ignore"):
         coefficients = np.ldexp(fit.c[::-1].transpose(1, 2, 0), powers)
     if ends == "periodic":
-        t0 -= dt * len(coefficients) * math.ceil(t0 / (dt * len(coefficients)))  # what repeats needs no large times
+        t0 = 0.0 - -t0 % (dt * len(coefficients))  # what repeats needs no large times
     return Table(t0, dt, np.ascontiguousarray(coefficients), ends)
 
 
