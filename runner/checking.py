@@ -208,11 +208,13 @@ def _expect_overlap(read: Table, table: Mapping[str, Any], name: str, duration: 
     if not read.covers(duration):
         raise InputError(Problem(where, f"{name}.ends", f'{lasts}: expected all of {wanted} with ends = "error"'))
     note = f"{name}: {lasts}, and the run takes {wanted} of it"
-    before, after = (read.dt * (len(intervals) - 1) for intervals in read.rests())
-    if read.t0 > read.dt * _WHOLE:
-        note += f"; before the record the motion starts from rest at its first value, {before:.4g} s earlier"
-    if read.end < duration - read.dt * _WHOLE:
-        note += f"; after the record the motion comes to rest at its last value, {after:.4g} s later"
+    early, late = read.t0 > read.dt * _WHOLE, read.end < duration - read.dt * _WHOLE
+    if early or late:
+        before, after = (read.dt * (len(intervals) - 1) for intervals in read.rests())
+        if early:
+            note += f"; before the record the motion starts from rest at its first value, {before:.4g} s earlier"
+        if late:
+            note += f"; after the record the motion comes to rest at its last value, {after:.4g} s later"
     if duration < read.dt:
         note += f": less than one of its sample intervals of {read.dt:.15g} s (is units.t right?)"
     return note

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import io
 import os
 import stat
 from collections.abc import Iterator
@@ -55,8 +54,7 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         return file.read_text("utf-8"), Path(str(file)).parent
     path = Path(source)
     try:
-        text = io.TextIOWrapper(io.BytesIO(_contents(path, _LARGEST_SCENARIO)), "utf-8-sig").read()
-        return text, Path(os.path.realpath(path)).parent
+        return _contents(path, _LARGEST_SCENARIO).decode("utf-8-sig"), Path(os.path.realpath(path)).parent
     except (FileNotFoundError, NotADirectoryError) as error:
         if path.suffix == ".toml" and path.parent.is_dir():
             there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
@@ -95,8 +93,10 @@ def canonical_path(path: str, folder: Path, where: str, key: str) -> str:
     if path.startswith(PACKAGED):
         return path
     try:
-        return os.path.realpath(folder / path)
-    except (OSError, ValueError) as error:  # a NUL, or a working directory that is gone
+        found = os.path.realpath(folder / path)
+        found.encode()
+        return found
+    except (OSError, ValueError) as error:  # a NUL, a working directory that is gone, a name that no TOML can hold
         raise InputError(Problem(where, key, f"is no path of a file ({error})", repr(path))) from error
 
 

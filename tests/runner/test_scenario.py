@@ -569,6 +569,12 @@ def test_paths_in_overrides_count_from_the_working_directory(tmp_path: Path, mon
     assert scenario.with_overrides({"base_motion.t0": 1.0}).tables()[0].t0 == -1.0
 
 
+def test_a_record_whose_name_no_toml_can_hold_is_refused(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff"))
+    with pytest.raises(InputError, match=r"base_motion\.path: is no path of a file \('utf-8' codec can't encode"):
+        load_scenario(record_folder(folder, RECORD))
+
+
 @pytest.mark.parametrize(
     ("name", "told"),
     [
