@@ -156,7 +156,7 @@ def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
         "d": [(f"d{k}", "") for k in range(system.d.numel())],
         "w": of(*REFERENCE, *BASE),
         "x": state,
-        "y": state,
+        "y": [(f"measured_{name}", unit) for name, unit in state],
         "dx": of(*(DERIVATIVES[item] for item in system.drive.state)),
         "M1": [
             (f"M1_{row.name}_{column.name}", f"{row.force} s^2/{column.unit}") for column in joints for row in joints

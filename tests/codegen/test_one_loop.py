@@ -1,0 +1,191 @@
+"""The loop is described once: what is added to it is in the batch kernel, the exported C and FMUs alike."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from fmi_client import Client, client_library
+
+from springline.codegen.api import generate_files
+from springline.codegen.export import bind
+from springline.codegen.fmu import Settings, fmu
+from springline.codegen.kernel import KernelOptions, LoopSettings, kernel
+from springline.codegen.manifest import write_tree
+from springline.model.hardware import EFFECTS, Effect
+from springline.model.mechanisms import MECHANISMS
+from springline.model.quantities import Q1, Quantity
+from springline.model.system import SignalShape, Structure
+
+STEP, STEPS, HOLD = 1e-4, 400, 10
+
+
+class WeakMotor(Effect):
+    """A motor that gives four fifths of what it is told."""
+
+    name = "weak_motor"
+
+    def actuate(self, u: ca.SX) -> ca.SX:
+        return 0.8 * u
+
+
+class Offset(Effect):
+    """Encoders that are a millimetre or milliradian off."""
+
+    name = "offset"
+
+    def sense(self, y: Mapping[Quantity, ca.SX]) -> Mapping[Quantity, ca.SX]:
+        return {**y, Q1: y[Q1] + 1e-3}
+
+
+@pytest.fixture(autouse=True)
+def _made_up_effects() -> Iterator[None]:
+    effects = (WeakMotor(), Offset())
+    EFFECTS.update({effect.name: effect for effect in effects})
+    yield
+    for effect in effects:
+        del EFFECTS[effect.name]
+
+
+def structure_of(mechanism: str, **changes: Any) -> Structure:
+    arm = MECHANISMS[mechanism]
+    terms = tuple(len(t) for t in arm.reference_terms)
+    given = {"reference": SignalShape("sine", terms), "base_motion": SignalShape("sine", (1, 1, 1))} | changes
+    return Structure(mechanism=mechanism, **given)
+
+
+def values_of(structure: Structure) -> np.ndarray:
+    """The mechanism's own reference and start, under a base that moves; U_max low enough to limit now and then."""
+    loop = kernel(structure, False, KernelOptions(engine="casadi"))
+    arm = MECHANISMS[structure.mechanism]
+    given = {"base_motion.shake.0.amplitude": 0.1, "base_motion.shake.0.omega": 9.0,
+             "base_motion.pitch.0.amplitude": 0.05, "base_motion.pitch.0.omega": 3.0}  # fmt: skip
+    for i, joint in enumerate(arm.joints):
+        given |= {f"initial.q.{i}": arm.start_position[i], f"reference.{joint.name}.offset": arm.reference_offset[i]}
+        for k, term in enumerate(arm.reference_terms[i]):
+            stem = f"reference.{joint.name}.terms.{k}"
+            given |= {f"{stem}.amplitude": term.amplitude, f"{stem}.omega": term.omega, f"{stem}.phase": term.phase}
+    return np.array([given.get(slot.key, slot.default) for slot in loop.program.system.slots])
+
+
+def rows_of(structure: Structure, sampled: bool, every: int = HOLD, **options: Any) -> np.ndarray:
+    loop = kernel(structure, sampled, KernelOptions(**options))
+    settings = LoopSettings(STEPS, STEP, hold=HOLD, output_every=every)
+    runs = loop.run(values_of(structure)[None], settings)
+    assert runs.status[0] == 0
+    return runs.trajectory[0]
+
+
+def names_of(structure: Structure) -> list[str]:
+    """Columns of the state, then of the command."""
+    arm = MECHANISMS[structure.mechanism]
+    state = ("q1", "dq1") if structure.drive == "rigid" else ("q1", "dq1", "q2", "dq2")
+    return [f"{quantity}_{joint.name}" for quantity in (*state, "U") for joint in arm.joints]
+
+
+def fmu_rows(structure: Structure, sampled: bool, version: int, folder: Path) -> np.ndarray:
+    settings = Settings(duration=STEPS * STEP, step=STEP, period=HOLD * STEP if sampled else 0.0)
+    content = fmu(structure, values_of(structure), settings, part="loop", version=version, identifier="arm", name="arm")
+    path = folder / f"arm{version}{int(sampled)}.fmu"
+    path.write_bytes(content)
+    client = Client(path, folder).start()
+    names = names_of(structure)
+    rows = [client.get(names)]
+    for k in range(STEPS // HOLD):
+        client.step(k * HOLD * STEP, HOLD * STEP)
+        rows.append(client.get(names))
+    return np.array(rows)
+
+
+def exported_rows(structure: Structure, folder: Path) -> np.ndarray:
+    """What main.c prints: the exported step and plant step under sampled control."""
+    write_tree(folder / "c", *generate_files(bind(structure, values_of(structure))))
+    program = folder / "main"
+    source = folder / "c"
+    subprocess.run(
+        ["cc", "-O1", "-ffp-contract=off", "-std=c99", f"-I{source}/include", f"-I{source}/src",
+         source / "src" / "springline.c", source / "main.c", "-o", program],
+        check=True,
+    )  # fmt: skip
+    printed = subprocess.run([program, "1"], capture_output=True, text=True, check=True).stdout.splitlines()
+    header, rows = printed[0].split(","), [[float(word) for word in line.split(",")] for line in printed[1:]]
+    joints = [joint.name for joint in MECHANISMS[structure.mechanism].joints]
+    wanted = [header.index(f"{quantity}_{joint}") for quantity in ("q1", "U") for joint in joints]
+    return np.array(rows)[:, wanted]
+
+
+def of_state_and_command(structure: Structure, rows: np.ndarray) -> np.ndarray:
+    n = len(MECHANISMS[structure.mechanism].joints)
+    states = (2 if structure.drive == "rigid" else 4) * n
+    return np.hstack([rows[:, 1 : 1 + states], rows[:, 1 + states + 3 * n : 1 + states + 4 * n]])
+
+
+@pytest.mark.parametrize("effect", ["weak_motor", "offset"])
+def test_an_effect_reaches_batch_exported_c_and_fmu(effect: str, tmp_path: Path) -> None:
+    structure, ideal = structure_of("one_link", effects=(effect,)), structure_of("one_link")
+    for sampled in (True, False):
+        rows = rows_of(structure, sampled, width=4, groups=1)
+        assert np.max(np.abs(rows - rows_of(ideal, sampled, width=4, groups=1))) > 1e-4
+        np.testing.assert_array_equal(rows, rows_of(structure, sampled, engine="casadi"))
+        expected = of_state_and_command(structure, rows)
+        np.testing.assert_array_equal(fmu_rows(structure, sampled, 3, tmp_path), expected)
+    sampled_rows = rows_of(structure, True, every=100)
+    expected = np.hstack([sampled_rows[:, 1:2], sampled_rows[:, 8:9]])  # q1 and U
+    np.testing.assert_array_equal(exported_rows(structure, tmp_path)[: len(expected)], expected)
+
+
+# Arms, drives and integrators by turns; dop853 for what keeps slopes and has many nodes.
+OTHERS = [
+    ("one_link", "elastic", "rk4"),
+    ("one_link", "rigid", "dop853"),
+    ("three_links", "elastic", "dop853"),
+    ("three_links", "rigid", "midpoint"),
+]
+
+
+@pytest.mark.parametrize(("mechanism", "drive", "integrator"), OTHERS)
+def test_other_arms_have_the_same_bits_in_both_engines_and_in_fmus(
+    mechanism: str, drive: str, integrator: str, tmp_path: Path
+) -> None:
+    structure = structure_of(mechanism, drive=drive, integrator=integrator)
+    for sampled, version in ((True, 2), (False, 3)):
+        rows = rows_of(structure, sampled, width=4, groups=2)
+        assert np.isfinite(rows).all()
+        np.testing.assert_array_equal(rows, rows_of(structure, sampled, engine="casadi"))
+        expected = of_state_and_command(structure, rows)
+        np.testing.assert_array_equal(fmu_rows(structure, sampled, version, tmp_path), expected)
+
+
+@pytest.mark.parametrize(("mechanism", "drive", "integrator"), OTHERS)
+def test_other_arms_are_exported_as_c_that_checks_itself(
+    mechanism: str, drive: str, integrator: str, tmp_path: Path
+) -> None:
+    structure = structure_of(mechanism, drive=drive, integrator=integrator)
+    folder = tmp_path / "c"
+    write_tree(folder, *generate_files(bind(structure, values_of(structure), tunable=["control"], prefix="other_arm")))
+    includes = [f"-I{folder}/include", f"-I{folder}/src"]
+    sources = [folder / "src" / "other_arm.c", folder / "src" / "other_arm_model.c", folder / "self_check.c"]
+    warnings = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-O1", "-ffp-contract=off"]
+    subprocess.run(["cc", *warnings, *includes, *sources, "-o", tmp_path / "check"], check=True)
+    done = subprocess.run(
+        [tmp_path / "check", folder / "test_vectors.txt"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout
+    texts = "".join(path.read_text() for path in folder.rglob("*") if path.suffix in (".c", ".h", ".md", ".txt"))
+    for foreign in ("lift", "rotation", "Guo"):
+        assert foreign not in texts
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("part", ["controller", "plant", "loop"])
+def test_fmus_of_another_arm_are_valid(part: Any, version: Any, tmp_path: Path) -> None:
+    structure = structure_of("three_links")
+    settings = Settings(duration=1.0, step=STEP, period=1e-3)
+    content = fmu(structure, values_of(structure), settings, part=part, version=version, identifier="a", name="a")
+    (tmp_path / "a.fmu").write_bytes(content)
+    assert client_library("fmpy.validation").validate_fmu(str(tmp_path / "a.fmu")) == []
