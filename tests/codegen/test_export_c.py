@@ -525,25 +525,27 @@ def test_limits_hold_and_are_flagged(library: Callable[[str], Library]) -> None:
 
 @pytest.mark.parametrize("name", ["tunable", "single_tunable"])
 def test_a_law_that_a_max_limits_is_flagged(name: str, library: Callable[[str], Library]) -> None:
-    """The power law's wish is k1 |sigma|^alpha + …: here found by moving the limit until it no longer counts."""
+    """Where the flag changes as the limit moves is the size of what the law wishes, equation (18) by hand."""
     lib = library(name)
     free = Case(lib, control_a_max_lift=math.inf, control_a_max_rotation=math.inf)
     assert free.step() == "OK"
     assert (free.diagnostics.a_limited_lift, free.diagnostics.a_limited_rotation) == (0, 0)
     for joint, other_joint in (("lift", "rotation"), ("rotation", "lift")):
-        low, high = 1e-3, 1e3  # limits, and does not
-        for _ in range(60):
+        low, high = 1e-3, 1e8  # limits, and does not
+        for _ in range(100):
             middle = 0.5 * (low + high)
             case = Case(lib, **{f"control_a_max_{joint}": middle, f"control_a_max_{other_joint}": math.inf})
             assert case.step() == "OK"
             assert getattr(case.diagnostics, f"a_limited_{other_joint}") == 0
             if getattr(case.diagnostics, f"a_limited_{joint}"):
-                assert values(case.command) != values(free.command)
                 low = middle
             else:
                 assert values(case.command) == values(free.command)
                 high = middle
-        assert 1.0 < high < 999.0  # the law's wish itself: below it limits, from it on it does not
+        size = abs(getattr(free.diagnostics, f"sigma_{joint}"))
+        logarithm = math.log(10.0 * size**2 + 1.0)
+        wish = 3.0 * size ** (0.9 * max(size, 1.0)) + 5.0 * logarithm**1.5 + 12.0 * logarithm**0.5
+        assert high == pytest.approx(wish, rel=1e-12 if name == "tunable" else 1e-5)
     case.measurement.q1_lift = math.nan
     assert case.step() == "BAD_MEASUREMENT"
     assert not any(values(case.diagnostics))
