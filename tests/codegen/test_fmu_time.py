@@ -208,6 +208,14 @@ def test_start_times_too_coarse_for_the_step_are_errors(build: Build, open_fmu: 
     client.step(edge - 0.5, 0.25)
 
 
+def test_a_step_that_would_take_hours_is_refused(build: Build, open_fmu: Open) -> None:
+    client = open_fmu(build("loop", 3)).start()
+    refused(client, lambda: client.step(0.0, 1.1e9 * STEP), "more than 1000000000 steps of 0.0001 s")
+    client.step(0.0)
+    idle = open_fmu(build("controller", 3)).start()  # counting samples takes no time, and still has an end
+    refused(idle, lambda: idle.step(0.0, 1.1e9 * PERIOD), "more than 1000000000 steps of 0.001 s")
+
+
 @pytest.mark.parametrize("version", [2, 3])
 def test_a_continuous_controller_takes_any_step_that_moves_the_clock(
     build: Build, open_fmu: Open, version: int
