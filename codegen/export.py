@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import hashlib
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen.manifest import canonical_json
+from springline.codegen.names import check_prefix
 from springline.codegen.program import count_operations
 from springline.model.base import COORDINATES
 from springline.model.parameters import Slot
@@ -81,6 +81,10 @@ class Export:
     def baked(self) -> tuple[int, ...]:
         """Indices of the slots that become constants, ascending."""
         return tuple(i for i in range(len(self.slots)) if i not in set(self.tunable))
+
+    def value(self, key: str) -> float:
+        """Number of a slot."""
+        return self.values[[slot.key for slot in self.slots].index(key)]
 
     def model_functions(self) -> Iterator[tuple[str, ca.Function]]:
         """Public name and frozen Function (last input p: all slots) of everything in MODEL_FUNCTIONS."""
@@ -179,7 +183,7 @@ def bind(
     tunable    parameters that stay arguments: slot keys, or what stands for several ("control", "control.mu")
     prefix     of every public name
     real       number type of the C
-    Raises ValueError for a wrong number of values, a value out of its bounds, an unknown name or no C identifier.
+    Raises ValueError for a wrong number of values, a value out of its bounds, an unknown name or an unusable prefix.
     """
     system = System(structure)
     if np.shape(values) != (len(system.slots),):
@@ -188,10 +192,7 @@ def bind(
     for slot, value in zip(system.slots, numbers, strict=True):
         if not slot.bounds.holds(value):
             raise ValueError(f"{slot.key} is {value!r}, expected {slot.bounds}")
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
-        raise ValueError(f"prefix {prefix!r} is no C identifier: letters, digits and _, a letter first")
-    if re.fullmatch(r"slf?(_.*)?|casadi(_.*)?", prefix):
-        raise ValueError(f"prefix {prefix!r} belongs to the library inside the C: choose another")
+    check_prefix(prefix)
     if real not in ("double", "float"):
         raise ValueError(f"real is {real!r}, expected 'double' or 'float'")
     return Export(system, numbers, _tunable(system.slots, tunable), prefix, real)

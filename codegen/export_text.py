@@ -15,7 +15,7 @@ from importlib.metadata import version
 from springline.codegen.export import Export, comment, provenance
 from springline.codegen.scalar import literal
 from springline.codegen.typed import STATUS, TypedInterface
-from springline.codegen.vectors import TIME_STEP
+from springline.codegen.vectors import TIME_STEP, control_outputs
 
 
 def text_files(export: Export, interface: TypedInterface) -> dict[str, bytes]:
@@ -69,9 +69,11 @@ def _main_blocks(interface: TypedInterface) -> dict[str, str]:
     joints = [joint.name for joint in interface.export.system.joints]
     columns = [("state", "q1"), ("reference", "q1d"), ("command", "U")]
     shown = [(owner, f"{quantity}_{joint}") for owner, quantity in columns for joint in joints]
+    missing = interface.missing_tables.replace("zero here", "main runs with zero")
     digits = "9" if interface.export.real == "float" else "17"
     return {
         "digits": digits,
+        "table_warning": f'  fprintf(stderr, "main: {missing}\\n");\n' if missing else "",
         "csv_header": ",".join(["t", *(name for _, name in shown)]),
         "print_fields": "\n".join(f'  printf(",%.{digits}g", (double){owner}->{name});' for owner, name in shown),
         "measure": "\n".join(
@@ -91,9 +93,8 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
     def taken(places: list[str]) -> str:
         return "\n".join(f"  got[{k}] = {place};" for k, place in enumerate(places))
 
-    outputs = [
-        f"{quantity}_{joint.name}" for quantity in ("U", "U_s", "U_f", "e", "sigma") for joint in export.system.joints
-    ]
+    outputs = control_outputs(export)
+    of_diagnostics = {field.name: field for field in structures["diagnostics"]}
     states = [field.name for field in structures["state"]]
     measured = [field.name for field in structures["measurement"]]
     tunable = export.tunable_slots
@@ -127,6 +128,7 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "control_in": str(3 * n + len(measured)),
         "control_out": str(len(outputs)),
         "command_out": str(n),
+        "model_out": str(5 * n),
         "command_to_vector": taken([f"command.{name}" for name in outputs[:n]]),
         "first_measurement": measured[0],
         "zero": literal(0.0, export.real),
@@ -140,8 +142,10 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "control_from_vector": filled(reference="reference->", measurement="measurement->"),
         "control_to_vector": taken(
             [
-                f"command.{name}" if name.startswith("U_") and k < n else f"diagnostics.{name}"
-                for k, name in enumerate(outputs)
+                f"command.{name}"
+                if name not in of_diagnostics
+                else f"{'(springline_real)' if of_diagnostics[name].integer else ''}diagnostics.{name}"
+                for name in outputs
             ]
         ),
         "model_call": "\n".join(call),
@@ -155,6 +159,12 @@ def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
     single = export.real == "float"
     cost = {"springline_step": "control", "one evaluation of the plant, of four in springline_plant_step": "plant"}
     return {
+        "table_note": (
+            f"{interface.missing_tables.removesuffix('.')}, in `{export.prefix}_signals` and so in what `main.c` runs "
+            "with. Put signals of your own in its place."
+            if interface.missing_tables
+            else f"`{export.prefix}_signals` has the scenario's reference and base motion."
+        ),
         "provenance": "  \n".join(provenance(export)),
         "field_table": "\n".join(
             f"| `springline_{name}` | `{field.name}` | {field.unit} |"

@@ -14,6 +14,7 @@ from springline.codegen.export_text import text_files
 from springline.codegen.fmu_settings import FmiVersion, Settings
 from springline.codegen.fmu_variables import NO_LIMIT, Interface, Variable, base_is_input
 from springline.codegen.kernel import Table
+from springline.codegen.names import check_files
 from springline.codegen.scalar import literal
 from springline.codegen.typed import TypedInterface, literal_constant
 
@@ -34,7 +35,8 @@ def sources(
     """The files of sources/ by name, but for fmu_token.h; all.c includes the others and is the one to compile."""
     stem, part = export.prefix, interface.part
     texts = text_files(export, typed)
-    files = {f"{stem}.h": texts[f"include/{stem}.h"], f"{stem}.c": texts[f"src/{stem}.c"]}
+    own = {f"{stem}.h": texts[f"include/{stem}.h"], f"{stem}.c": texts[f"src/{stem}.c"]}
+    files = {}
     runtime = resources.files("springline.codegen") / "runtime"
     files["sl_math.h"] = (runtime / "sl_math.h").read_bytes()
     for name in _HEADERS[version]:
@@ -63,7 +65,8 @@ def sources(
         comment([*provenance(export), "", "The whole FMU; compile this file alone, as C99."])
         + "".join(f'#include "{name}"\n' for name in includes)
     ).encode()
-    return dict(sorted(files.items()))
+    check_files(stem, own, [*files, "fmu_token.h"])
+    return dict(sorted((files | own).items()))
 
 
 def _named(text: str, prefix: str) -> str:

@@ -39,6 +39,7 @@ _MEANINGS = {
     "U_s": "slow part of the command, before its limit",
     "U_f": "fast part of the command, before its limit",
     "saturated": "whether U_max limits the command",
+    "a_limited": "whether a_max limits the acceleration that the reaching law wishes",
 }
 
 

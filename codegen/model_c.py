@@ -6,6 +6,7 @@ import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from functools import partial
+from importlib import resources
 
 from springline.codegen.baking import print_baked
 from springline.codegen.export import Export, Port, comment, operations, provenance
@@ -19,9 +20,15 @@ these functions: pass 0.
 _CASADI = "<name>_work, _sparsity_in and so on are what casadi.external and other CasADi tools ask for."
 _FIVE_ARGUMENTS = """\
 #if defined(__GNUC__) /* the convention has five arguments, whether a function needs them or not */
+#pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
+"""
+_END = """
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
 """
 _ENTRY = "int {name}(const {real}** arg, {real}** res, long long int* iw, {real}* w, int mem)"
 
@@ -38,14 +45,30 @@ def model_files(export: Export) -> dict[str, bytes]:
             re.sub(r"\bcasadi_int\b", "long long int", re.sub(r"\bcasadi_real\b", "double", signature)) + ";"
             for signature in exported
         ]
+        source = _self_contained(source)
         start.append(_CASADI)
     else:
         source, declarations = _print_single(export, stem)
     banner = comment([*start, "", *function_table(export)])
     return {
-        f"src/{stem}.c": (banner + "\n" + _FIVE_ARGUMENTS + source).encode(),
+        f"src/{stem}.c": (banner + "\n" + _FIVE_ARGUMENTS + source + _END).encode(),
         f"src/{stem}.h": (banner + "\n" + _header(stem, declarations)).encode(),
     }
+
+
+def _self_contained(source: str) -> str:
+    """CasADi's C as one of several in a translation unit, C or C++: no macro outlives it, C++ takes C99's branches."""
+    source = source.replace("#if __STDC_VERSION__ < 199901L", "#if !defined(__cplusplus) && __STDC_VERSION__ < 199901L")
+    mathematics = (resources.files("springline.codegen") / "runtime" / "sl_casadi.h").read_text(encoding="utf-8")
+    macros = [
+        *re.findall(r"^ *#define (\w+)", source, re.MULTILINE),
+        *re.findall(r"^#define (\w+) sl_\w+$", mathematics, re.MULTILINE),
+        "SL_CASADI_H",
+    ]
+    # These have one meaning wherever CasADi prints them, and whoever compiles may have set them.
+    shared = ("casadi_real", "casadi_int", "CASADI_SYMBOL_EXPORT")
+    ends = "".join(f"#undef {name}\n" for name in dict.fromkeys(macros) if name not in shared)
+    return f"{source}\n/* Another file may follow in the same translation unit. */\n{ends}"
 
 
 def _print_single(export: Export, stem: str) -> tuple[str, list[str]]:

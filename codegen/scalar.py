@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, cast
 
 import casadi as ca
@@ -83,13 +84,12 @@ class _Values(ValueGraph):
             "d": [self.constant(0.0)] * export.system.d.numel(),  # tables are not part of an export
         }
 
-    def apply(self, function: ca.Function) -> list[int]:
-        """Add a Function whose inputs are leaves of their own names; the nodes of all its outputs' entries."""
+    def apply(self, function: ca.Function, **given: list[int]) -> list[int]:
+        """Add a Function; the nodes of all its outputs' entries. Inputs not given are leaves of their own names."""
         names = [function.name_in(i) for i in range(function.n_in())]
+        known = self._known | given
         inputs = [
-            self._known[name]
-            if name in self._known
-            else [self.leaf(name, k, Binding.STATE) for k in range(function.numel_in(i))]
+            known[name] if name in known else [self.leaf(name, k, Binding.STATE) for k in range(function.numel_in(i))]
             for i, name in enumerate(names)
         ]
         printed = cast(ca.Function, _SinglePrecision(function)) if self._single else function
@@ -100,11 +100,13 @@ class _Values(ValueGraph):
 class Body:
     """Statements of a function and what they cost.
 
+    values      C of the outputs' entries, where `lines` have run
     operations  arithmetic operations and calls of elementary functions
     live        most values that are alive at once
     """
 
     lines: tuple[str, ...]
+    values: tuple[str, ...]
     operations: int
     live: int
 
@@ -117,6 +119,7 @@ class ScalarPrinter:
     """
 
     def __init__(self, export: Export, functions: Sequence[ca.Function], *, hoist: bool) -> None:
+        self._export = export
         self._real: Real = export.real
         self._math = "slf" if export.real == "float" else "sl"
         self._hoist = hoist
@@ -133,13 +136,29 @@ class ScalarPrinter:
             if node.op is None and node.binding is not Binding.CONSTANT:
                 is_p = source == "p"
                 self._names[i] = export.tunable_slots[k].symbol if is_p else entries[source][k][0]
-        self._derived: dict[int, int] = {}
-        if hoist:
+
+    def compose(self, name: str, port: str, function: ca.Function, quantity: str) -> None:
+        """Let Function `name` also compute the scalar `function` of every entry of its output `port`.
+
+        The results come after its own outputs, under the names that `quantity` has; what both compute is computed once.
+        """
+        labels = [label for label, _ in port_entries(self._export.system)[port]]
+        places = [self._labels[name].index(label) for label in labels]
+        [argument] = (function.name_in(i) for i in range(function.n_in()) if function.name_in(i) != "p")
+        for place in places:
+            self._wanted[name] += self._graph.apply(function, **{argument: [self._wanted[name][place]]})
+        self._labels[name] += [label for label, _ in port_entries(self._export.system)[quantity]]
+
+    @cached_property
+    def _derived(self) -> dict[int, int]:
+        """Place among the derived values of each node that depends on parameters only and is needed by a function."""
+        places: dict[int, int] = {}
+        if self._hoist:
             for wanted in self._wanted.values():
                 for i in self._given(wanted):
-                    node = self._graph.nodes[i]
-                    if node.op is not None:
-                        self._derived.setdefault(i, len(self._derived))
+                    if self._graph.nodes[i].op is not None:
+                        places.setdefault(i, len(places))
+        return places
 
     @property
     def derived(self) -> int:
@@ -152,7 +171,10 @@ class ScalarPrinter:
         return frozenset(source for source in sources if source[0])
 
     def body(self, name: str, load: Callable[[str, int], str], targets: Sequence[str]) -> Body:
-        """Function `name`; load(input, entry) is the C of an input ("derived" is one), targets take the outputs."""
+        """Function `name`; load(input, entry) is the C of an input ("derived" is one).
+
+        targets  take its outputs, the first of them where there are more outputs than targets
+        """
         wanted = self._wanted[name]
         return self._body(wanted, self._needed(wanted), load, targets, self._labels[name])
 
@@ -224,8 +246,8 @@ class ScalarPrinter:
             lines.append(f"const {kind} {names[i]} = {text};")
             ready.add(i)
         values = [value(i) for i in wanted]
-        lines += [f"{target} = {text};" for target, text in zip(targets, values, strict=True)]
-        return Body(tuple(lines), len(needed), self._live(wanted, needed))
+        lines += [f"{target} = {text};" for target, text in zip(targets, values[: len(targets)], strict=True)]
+        return Body(tuple(lines), tuple(values), len(needed), self._live(wanted, needed))
 
     def _named(self, wanted: Sequence[int], needed: Sequence[int], labels: Sequence[str]) -> dict[int, str]:
         """What each value is called: by the model where it has a word for it, else a0, a1, … in order."""

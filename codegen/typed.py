@@ -46,6 +46,7 @@ class TypedInterface:
         entries = port_entries(system)
         names = ("control", "plant", "start", "signals")
         self._printer = ScalarPrinter(export, [system.function(name) for name in names], hoist=True)
+        self._printer.compose("control", "sigma", system.function(f"law_{system.structure.law}"), "dsigma")
         read = self._printer.reads("control")
 
         def fields(*ports: str) -> tuple[Field, ...]:
@@ -58,12 +59,16 @@ class TypedInterface:
                 for joint in system.joints
             )
 
-        saturated = tuple(Field(f"saturated_{joint.name}", "0 or 1", integer=True) for joint in system.joints)
+        flags = tuple(
+            Field(f"{flag}_{joint.name}", "0 or 1", integer=True)
+            for flag in ("saturated", "a_limited")
+            for joint in system.joints
+        )
         self.structures: dict[str, tuple[Field, ...]] = {
             "reference": fields("q1d", "dq1d", "ddq1d"),
             "measurement": tuple(field for k, field in enumerate(fields("x")) if ("x", k) in read),
             "command": per_joint(("U", "{F}")),
-            "diagnostics": (*per_joint(("e", "{q}"), ("sigma", "{q}/s"), ("U_s", "{F}"), ("U_f", "{F}")), *saturated),
+            "diagnostics": (*per_joint(("e", "{q}"), ("sigma", "{q}/s"), ("U_s", "{F}"), ("U_f", "{F}")), *flags),
             "state": fields("x"),
             "base": fields("b", "db", "ddb"),
         }
@@ -142,7 +147,7 @@ class TypedInterface:
         system = export.system
         blocks = {f"{name}_fields": self._fields(name) for name in self.structures if name != "parameters"}
         blocks |= {
-            f"{name}_is_finite": _all(f"is_finite({name}->{field.name})" for field in self.structures[name])
+            f"{name}_is_finite": _all(f"springline_is_finite({name}->{field.name})" for field in self.structures[name])
             for name in ("reference", "measurement", "command", "base")
         }
         diagnostics = self.structures["diagnostics"]
@@ -152,6 +157,9 @@ class TypedInterface:
             f"  diagnostics->saturated_{j.name} = command->U_{j.name} < {total} || command->U_{j.name} > {total};"
             for j, total in zip(system.joints, sums, strict=True)
         ]
+        for j, wished in zip(system.joints, self.bodies["control"].values[-system.n :], strict=True):
+            limit = self._parameter(f"control.a_max.{system.joints.index(j)}")
+            flags.append(f"  diagnostics->a_limited_{j.name} = {wished} < -{limit} || {wished} > {limit};")
         state = self.structures["state"]
         blocks |= {
             "status_enum": ",\n".join(f"  SPRINGLINE_{name} = {value}" for value, (name, _) in enumerate(STATUS)),
@@ -159,7 +167,7 @@ class TypedInterface:
             "zero_command": self._zeros("command"),
             "zero_diagnostics": self._zeros("diagnostics"),
             "zero_base": self._zeros("base"),
-            "control_is_finite": _all(f"is_finite({value})" for value in (*values, *sums)),
+            "control_is_finite": _all(f"springline_is_finite({value})" for value in (*values, *sums)),
             "control": "\n".join(["  (void)controller;", *self._lines("control"), *flags]),
             "plant": "\n".join(["  (void)controller, (void)base;", *self._lines("plant")]),
             "start": "\n".join(self._lines("start")),
@@ -174,9 +182,8 @@ class TypedInterface:
         }
         derived, tunable = self.derived, export.tunable_slots
         derive = [f"  {line}" for line in self.derive.lines]
-        signature = "static void derive(const springline_parameters *parameters, real *derived) {\n"
-        if not tunable:
-            signature = "static void derive(real *derived) {\n"
+        given = "const springline_parameters *parameters, " if tunable else ""
+        signature = f"static void springline_derive({given}springline_real *derived) {{\n"
         argument = "&config->parameters, " if tunable else ""
         defaults = ", ".join(literal_constant(export.values[i], real) for i in export.tunable)
         blocks |= {
@@ -190,13 +197,15 @@ class TypedInterface:
             "derive": "\n".join(["/* What depends on parameters only. */", signature + "\n".join(derive), "}", "", ""])
             if derived
             else "",
-            "take_derived": f"  derive({argument}controller->derived);\n" if derived else "",
+            "take_derived": f"  springline_derive({argument}controller->derived);\n" if derived else "",
             "what_may_change": "Parameters and fallback may change."
             if tunable
             else "All parameters are constants here,\n"
             " * so only the fallback can change (--tunable NAMES makes parameters that can).",
             "parameters_check": self._parameters_check(),
-            "judge_parameters": "  if (!parameters_are_good(&config->parameters)) return SPRINGLINE_BAD_PARAMETER;\n"
+            "judge_parameters": "  if (!springline_parameters_are_good(&config->parameters)) {\n"
+            "    return SPRINGLINE_BAD_PARAMETER;\n"
+            "  }\n"
             if tunable
             else "",
         }
@@ -205,9 +214,16 @@ class TypedInterface:
     def _lines(self, name: str) -> list[str]:
         return [f"  {line}" for line in self.bodies[name].lines]
 
+    def _parameter(self, key: str) -> str:
+        """C of a parameter's value inside a function that is given the controller."""
+        k = [slot.key for slot in self.export.slots].index(key)
+        if k in self.export.tunable:
+            return f"controller->config.parameters.{self.export.slots[k].symbol}"
+        return literal(self.export.values[k], self.export.real)
+
     def _fields(self, name: str) -> str:
         members = self.structures[name]
-        declarations = [f"{'int' if field.integer else 'springline_real'} {field.name};" for field in members]
+        declarations = [f"{'int32_t' if field.integer else 'springline_real'} {field.name};" for field in members]
         width = max(map(len, declarations))
         return "\n".join(
             f"  {text:{width}} /* {field.unit} */" for text, field in zip(declarations, members, strict=True)
@@ -235,19 +251,23 @@ class TypedInterface:
         if not slots:
             return ""
         tests = [text for s in slots for text in bounds_tests(f"p->{s.symbol}", s.bounds, self.export.real)]
-        return f"static int parameters_are_good(const springline_parameters *p) {{\n  return {_all(tests)};\n}}\n\n"
+        opening = "static int springline_parameters_are_good(const springline_parameters *p) {"
+        return f"{opening}\n  return {_all(tests)};\n}}\n\n"
 
     def _signals_meaning(self) -> str:
-        structure = self.export.system.structure
         text = "Reference and base motion of the exported scenario at time t, s."
-        tables = [
-            n
-            for n, s in (("reference", structure.reference), ("base motion", structure.base_motion))
-            if s.kind == "table"
-        ]
-        if tables:
-            text += f" Its {' and '.join(tables)} table is not part of the export: zero here."
-        return text
+        return f"{text} {self.missing_tables}".rstrip()
+
+    @property
+    def missing_tables(self) -> str:
+        """A sentence on the signals that come from tables, which are not exported; empty where there are none."""
+        structure = self.export.system.structure
+        signals = (("reference", structure.reference), ("base motion", structure.base_motion))
+        tables = [name for name, shape in signals if shape.kind == "table"]
+        if not tables:
+            return ""
+        noun = "tables are" if len(tables) > 1 else "table is"
+        return f"The scenario's {' and '.join(tables)} {noun} not part of the export: zero here."
 
 
 def literal_constant(value: float, real: Real) -> str:
@@ -259,7 +279,7 @@ def literal_constant(value: float, real: Real) -> str:
 
 def bounds_tests(expression: str, bounds: Bounds, real: Real) -> list[str]:
     """C conditions that hold if and only if the value is admissible; NaN never is."""
-    tests = [] if bounds.infinite else [f"is_finite({expression})"]
+    tests = [] if bounds.infinite else [f"springline_is_finite({expression})"]
     if not math.isinf(bounds.low):
         tests.append(f"{expression} {'>' if bounds.low_open else '>='} {literal(bounds.low, real)}")
     if not math.isinf(bounds.high):

@@ -67,8 +67,8 @@ def test_vectors(export: Export, interface: TypedInterface, sources: Mapping[str
 
 
 def control_outputs(export: Export) -> list[str]:
-    """What a control vector's outputs are called, in order."""
-    quantities = ("U", "U_s", "U_f", "e", "sigma")
+    """What a control vector's outputs are called, in order: those of the model's control, then the flags of limits."""
+    quantities = ("U", "U_s", "U_f", "e", "sigma", "saturated", "a_limited")
     return [f"{quantity}_{joint.name}" for quantity in quantities for joint in export.system.joints]
 
 
@@ -115,7 +115,19 @@ def _control_rows(interface: TypedInterface, model: _Model) -> Iterator[list[flo
         reference = np.array([*q1d, *dq1d, *ddq1d], model.dtype)
         x = np.array([*q1, *dq1, *q1, *dq2], model.dtype)
         outputs = model("control", *np.split(reference, 3), x)
-        yield [*reference, *x[measured], *(value for part in outputs for value in part)]
+        flags = _limits_met(interface.export, model, *outputs)
+        yield [*reference, *x[measured], *(value for part in outputs for value in part), *flags]
+
+
+def _limits_met(
+    export: Export, model: _Model, u: Numbers, slow: Numbers, fast: Numbers, _: Numbers, sigma: Numbers
+) -> Iterator[float]:
+    """Per joint whether U_max has limited the command (0 or 1), then whether a_max has limited the reaching law."""
+    yield from (u != slow + fast).astype(float)
+    law = f"law_{export.system.structure.law}"
+    for i, value in enumerate(sigma):
+        [wished] = model(law, np.array([value], model.dtype))
+        yield float(abs(wished[0]) > model.dtype(export.value(f"control.a_max.{i}")))
 
 
 def _plant_rows(interface: TypedInterface, model: _Model) -> Iterator[list[float]]:

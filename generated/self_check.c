@@ -19,9 +19,10 @@
 
 typedef uint64_t bits;
 
-enum { CONTROL_IN = 12, CONTROL_OUT = 10, COMMAND_OUT = 2, PLANT_IN = 19, PLANT_OUT = 8, LINE = 4096 };
+enum { CONTROL_IN = 12, CONTROL_OUT = 14, COMMAND_OUT = 2, MODEL_OUT = 10,
+       PLANT_IN = 19, PLANT_OUT = 8, LINE = 4096 };
 
-static const char *const control_outputs[CONTROL_OUT] = { "U_lift", "U_rotation", "U_s_lift", "U_s_rotation", "U_f_lift", "U_f_rotation", "e_lift", "e_rotation", "sigma_lift", "sigma_rotation" };
+static const char *const control_outputs[CONTROL_OUT] = { "U_lift", "U_rotation", "U_s_lift", "U_s_rotation", "U_f_lift", "U_f_rotation", "e_lift", "e_rotation", "sigma_lift", "sigma_rotation", "saturated_lift", "saturated_rotation", "a_limited_lift", "a_limited_rotation" };
 static const char *const plant_outputs[PLANT_OUT] = { "q1_lift", "q1_rotation", "dq1_lift", "dq1_rotation", "q2_lift", "q2_rotation", "dq2_lift", "dq2_rotation" };
 static const springline_real plant_time_step = 0.0001;
 
@@ -86,6 +87,10 @@ static int replay_control(springline_controller *controller, long line, const sp
   got[7] = diagnostics.e_rotation;
   got[8] = diagnostics.sigma_lift;
   got[9] = diagnostics.sigma_rotation;
+  got[10] = (springline_real)diagnostics.saturated_lift;
+  got[11] = (springline_real)diagnostics.saturated_rotation;
+  got[12] = (springline_real)diagnostics.a_limited_lift;
+  got[13] = (springline_real)diagnostics.a_limited_rotation;
   return differs("springline_step", line, control_outputs, CONTROL_OUT, expected, got);
 }
 
@@ -134,7 +139,7 @@ static int replay_retuning(springline_controller *controller, long line, const s
 
 /* The same inputs through the function that CasADi printed. */
 static int replay_model(long line, const springline_real *in, const springline_real *expected) {
-  springline_real got[CONTROL_OUT];
+  springline_real got[MODEL_OUT];
   double x[8] = {0.0};
   const double *arg[4] = {0};
   double *res[5] = {0};
@@ -154,7 +159,7 @@ static int replay_model(long line, const springline_real *in, const springline_r
   res[3] = got + 6;
   res[4] = got + 8;
   if (springline_control(arg, res, 0, 0, 0) != 0) return 1;
-  return differs("springline_control", line, control_outputs, CONTROL_OUT, expected, got);
+  return differs("springline_control", line, control_outputs, MODEL_OUT, expected, got);
 }
 
 static int replay_plant(const springline_controller *controller, long line, const springline_real *in,

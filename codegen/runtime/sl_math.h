@@ -23,9 +23,20 @@
 #ifdef __FAST_MATH__
 #error "sl_math.h needs IEEE arithmetic: compile without -ffast-math"
 #endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
-#error "sl_math.h needs doubles evaluated as double: on 32-bit x86 compile with -msse2 -mfpmath=sse"
+#if FLT_RADIX != 2 || DBL_MANT_DIG != 53 || DBL_MIN_EXP != -1021 || DBL_MAX_EXP != 1024
+#error "sl_math.h needs double to be 64-bit IEEE: with newer avr-gcc -mdouble=64, elsewhere export with --real float"
 #endif
+#ifndef UINT64_MAX
+#error "sl_math.h needs uint64_t, which this compiler does not have: export with --real float"
+#endif
+#if defined(__FLOAT_WORD_ORDER__) && defined(__BYTE_ORDER__) && __FLOAT_WORD_ORDER__ != __BYTE_ORDER__
+#error "sl_math.h needs doubles in the byte order of integers: on ARM compile for VFP or the AAPCS, not for FPA"
+#endif
+/* 2: long double, negative: unknown; with 1 and with the values from 16 on double arithmetic is double */
+#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD == 2 || FLT_EVAL_METHOD > 64)
+#error "sl_math.h needs doubles evaluated as double, not in a longer format: on x86 compile with -msse2 -mfpmath=sse"
+#endif
+typedef char sl_double_has_the_size_of_uint64_t[sizeof(double) == sizeof(uint64_t) ? 1 : -1];
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
 #endif

@@ -15,9 +15,17 @@
 #ifdef __FAST_MATH__
 #error "sl_mathf.h needs IEEE arithmetic: compile without -ffast-math"
 #endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
-#error "sl_mathf.h needs floats evaluated as float: on 32-bit x86 compile with -msse2 -mfpmath=sse"
+#if FLT_RADIX != 2 || FLT_MANT_DIG != 24 || FLT_MIN_EXP != -125 || FLT_MAX_EXP != 128
+#error "sl_mathf.h needs float to be the 32-bit IEEE format, and this compiler has another"
 #endif
+#if !defined(UINT32_MAX) || !defined(UINT64_MAX)
+#error "sl_mathf.h needs uint32_t and uint64_t, which this compiler does not have"
+#endif
+/* 1: double, 2: long double, 64: double, negative: unknown; with 16 and 32 float arithmetic is float */
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16 && FLT_EVAL_METHOD != 32
+#error "sl_mathf.h needs floats evaluated as float: on x86 -msse2 -mfpmath=sse, on s390x -fexcess-precision=fast"
+#endif
+typedef char slf_float_has_the_size_of_uint32_t[sizeof(float) == sizeof(uint32_t) ? 1 : -1];
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
 #endif
@@ -218,7 +226,9 @@ static inline float slf_log_sum(float k, float f, float lo) {
 }
 
 /* What the exponent field of the shifted bits counts, of an x that was multiplied by 2^scaled. */
-static inline float slf_exponent(uint32_t shifted, int scaled) { return (float)(((int)shifted >> 23) - scaled); }
+static inline float slf_exponent(uint32_t shifted, int scaled) {
+  return (float)((int)((shifted >> 23) ^ 0x100u) - (0x100 + scaled)); /* the field's sign bit, folded by hand */
+}
 
 static inline float slf_log_of(float x, int scaled) {
   uint32_t b = slf_bits(x), shifted = b - SLF_SQRT_HALF;

@@ -8,7 +8,8 @@
  *     dq2_rotation (rad/s)
  * command: U_lift (N), U_rotation (N m)
  * diagnostics: e_lift (m), e_rotation (rad), sigma_lift (m/s), sigma_rotation (rad/s), U_s_lift (N),
- *     U_s_rotation (N m), U_f_lift (N), U_f_rotation (N m), saturated_lift (0 or 1), saturated_rotation (0 or 1)
+ *     U_s_rotation (N m), U_f_lift (N), U_f_rotation (N m), saturated_lift (0 or 1), saturated_rotation (0 or
+ *     1), a_limited_lift (0 or 1), a_limited_rotation (0 or 1)
  * state: q1_lift (m), q1_rotation (rad), dq1_lift (m/s), dq1_rotation (rad/s), q2_lift (m), q2_rotation (rad),
  *     dq2_lift (m/s), dq2_rotation (rad/s)
  * base: y_r1 (m), theta_1z (rad), theta_1x (rad), d_y_r1 (m/s), d_theta_1z (rad/s), d_theta_1x (rad/s), dd_y_r1
@@ -17,6 +18,8 @@
  */
 #ifndef SPRINGLINE_H
 #define SPRINGLINE_H
+
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -71,7 +74,8 @@ typedef struct springline_command {
   springline_real U_rotation; /* N m */
 } springline_command;
 
-/* Why: tracking error e, sliding variable sigma, the two parts of U, and whether U_max has limited it (0 or 1). */
+/* Why: tracking error e, sliding variable sigma, the two parts of U, and whether a limit was met (0 or 1): saturated
+ * where U_max has limited U, a_limited where a_max has limited the acceleration that the reaching law wished. */
 typedef struct springline_diagnostics {
   springline_real e_lift;         /* m */
   springline_real e_rotation;     /* rad */
@@ -81,8 +85,10 @@ typedef struct springline_diagnostics {
   springline_real U_s_rotation;   /* N m */
   springline_real U_f_lift;       /* N */
   springline_real U_f_rotation;   /* N m */
-  int saturated_lift;             /* 0 or 1 */
-  int saturated_rotation;         /* 0 or 1 */
+  int32_t saturated_lift;         /* 0 or 1 */
+  int32_t saturated_rotation;     /* 0 or 1 */
+  int32_t a_limited_lift;         /* 0 or 1 */
+  int32_t a_limited_rotation;     /* 0 or 1 */
 } springline_diagnostics;
 
 /* The plant's state: joint coordinates q1, motor coordinates q2 (reflected to the joint), and their rates. */
@@ -111,7 +117,7 @@ typedef struct springline_base {
 } springline_base;
 
 typedef struct springline_config {
-  int fallback; /* SPRINGLINE_FALLBACK_ZERO or SPRINGLINE_FALLBACK_LAST */
+  int32_t fallback; /* SPRINGLINE_FALLBACK_ZERO or SPRINGLINE_FALLBACK_LAST */
 } springline_config;
 
 /* Zero force as fallback. */
@@ -121,7 +127,7 @@ extern const springline_config springline_default_config;
 typedef struct springline_controller {
   springline_config config;
   springline_command last;
-  int ready;
+  int32_t ready;
 } springline_controller;
 
 /*
@@ -141,9 +147,10 @@ int springline_set_parameters(springline_controller *controller, const springlin
 int springline_reset(springline_controller *controller);
 
 /*
- * Computes the command for one sample. The law keeps no state from step to step, so any sample rate will do; for the
- * default drive 1 kHz is enough. Whatever happens *command is set: to the fallback if the status is not SPRINGLINE_OK.
- * diagnostics may be NULL; it is zero if the status is not SPRINGLINE_OK.
+ * Computes the command for one sample. The law keeps no state from step to step, but the arm does: sampled too slowly,
+ * or with its command too late, it leaves its reference or diverges (README.md has figures). Whatever happens *command is
+ * set: to the fallback if the status is not SPRINGLINE_OK. diagnostics may be NULL; it is zero if the status is not
+ * SPRINGLINE_OK.
  */
 int springline_step(springline_controller *controller, const springline_reference *reference,
                     const springline_measurement *measurement, springline_command *command,

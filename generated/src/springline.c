@@ -8,7 +8,8 @@
  *     dq2_rotation (rad/s)
  * command: U_lift (N), U_rotation (N m)
  * diagnostics: e_lift (m), e_rotation (rad), sigma_lift (m/s), sigma_rotation (rad/s), U_s_lift (N),
- *     U_s_rotation (N m), U_f_lift (N), U_f_rotation (N m), saturated_lift (0 or 1), saturated_rotation (0 or 1)
+ *     U_s_rotation (N m), U_f_lift (N), U_f_rotation (N m), saturated_lift (0 or 1), saturated_rotation (0 or
+ *     1), a_limited_lift (0 or 1), a_limited_rotation (0 or 1)
  * state: q1_lift (m), q1_rotation (rad), dq1_lift (m/s), dq1_rotation (rad/s), q2_lift (m), q2_rotation (rad),
  *     dq2_lift (m/s), dq2_rotation (rad/s)
  * base: y_r1 (m), theta_1z (rad), theta_1x (rad), d_y_r1 (m/s), d_theta_1z (rad/s), d_theta_1x (rad/s), dd_y_r1
@@ -21,22 +22,20 @@
 
 #include "sl_math.h"
 
-typedef springline_real real;
-
-enum { READY = 0x5a17 }; /* springline_init has been here */
+enum { SPRINGLINE_READY = 0x5a17 }; /* springline_init has been here */
 
 const springline_config springline_default_config = {SPRINGLINE_FALLBACK_ZERO};
 
-static const springline_command no_command = {0.0, 0.0};
-static const springline_diagnostics no_diagnostics = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0};
-static const springline_base base_at_rest = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+static const springline_command springline_no_command = {0.0, 0.0};
+static const springline_diagnostics springline_no_diagnostics = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0, 0};
+static const springline_base springline_base_at_rest = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
 
 /* ---- the model, printed from the frozen expressions ------------------------------------------------------- */
 
 /* 122 operations */
-static void control(const springline_controller *controller, const springline_reference *reference,
-                    const springline_measurement *measurement, springline_command *command,
-                    springline_diagnostics *diagnostics) {
+static void springline_evaluate_control(const springline_controller *controller, const springline_reference *reference,
+                                        const springline_measurement *measurement, springline_command *command,
+                                        springline_diagnostics *diagnostics) {
   (void)controller;
   const double dq1d_lift = reference->dq1d_lift;
   const double dq1_lift = measurement->dq1_lift;
@@ -75,8 +74,8 @@ static void control(const springline_controller *controller, const springline_re
   const double a30 = a28 + a29;
   const double a31 = sl_sign(sigma_lift);
   const double a32 = a30 * a31;
-  const double a33 = -a32;
-  const double a34 = sl_fmax(a33, -200.0);
+  const double dsigma_lift = -a32;
+  const double a34 = sl_fmax(dsigma_lift, -200.0);
   const double a35 = sl_fmin(a34, 200.0);
   const double a36 = 3.0 * a2;
   const double a37 = 12.0 * a36;
@@ -132,8 +131,8 @@ static void control(const springline_controller *controller, const springline_re
   const double a81 = a79 + a80;
   const double a82 = sl_sign(sigma_rotation);
   const double a83 = a81 * a82;
-  const double a84 = -a83;
-  const double a85 = sl_fmax(a84, -200.0);
+  const double dsigma_rotation = -a83;
+  const double a85 = sl_fmax(dsigma_rotation, -200.0);
   const double a86 = sl_fmin(a85, 200.0);
   const double a87 = 3.0 * a53;
   const double a88 = 5.0 * a87;
@@ -184,11 +183,14 @@ static void control(const springline_controller *controller, const springline_re
   diagnostics->sigma_rotation = sigma_rotation;
   diagnostics->saturated_lift = command->U_lift < diagnostics->U_s_lift + diagnostics->U_f_lift || command->U_lift > diagnostics->U_s_lift + diagnostics->U_f_lift;
   diagnostics->saturated_rotation = command->U_rotation < diagnostics->U_s_rotation + diagnostics->U_f_rotation || command->U_rotation > diagnostics->U_s_rotation + diagnostics->U_f_rotation;
+  diagnostics->a_limited_lift = dsigma_lift < -200.0 || dsigma_lift > 200.0;
+  diagnostics->a_limited_rotation = dsigma_rotation < -200.0 || dsigma_rotation > 200.0;
 }
 
 /* dx/dt; 106 operations */
-static void plant(const springline_controller *controller, const springline_base *base, const real *x,
-                  const springline_command *command, real *dx) {
+static void springline_evaluate_plant(const springline_controller *controller, const springline_base *base,
+                                      const springline_real *x, const springline_command *command,
+                                      springline_real *dx) {
   (void)controller, (void)base;
   const double q1_rotation = x[1];
   double sin_q1_rotation, cos_q1_rotation;
@@ -324,69 +326,71 @@ static void plant(const springline_controller *controller, const springline_base
 
 /* ---- checks ------------------------------------------------------------------------------------------------ */
 
-static int is_finite(real x) { return sl_isfinite(x); }
+static int springline_is_finite(springline_real x) { return sl_isfinite(x); }
 
-static int reference_is_finite(const springline_reference *reference) {
-  return is_finite(reference->q1d_lift) &&
-         is_finite(reference->q1d_rotation) &&
-         is_finite(reference->dq1d_lift) &&
-         is_finite(reference->dq1d_rotation) &&
-         is_finite(reference->ddq1d_lift) &&
-         is_finite(reference->ddq1d_rotation);
+static int springline_reference_is_finite(const springline_reference *reference) {
+  return springline_is_finite(reference->q1d_lift) &&
+         springline_is_finite(reference->q1d_rotation) &&
+         springline_is_finite(reference->dq1d_lift) &&
+         springline_is_finite(reference->dq1d_rotation) &&
+         springline_is_finite(reference->ddq1d_lift) &&
+         springline_is_finite(reference->ddq1d_rotation);
 }
 
-static int measurement_is_finite(const springline_measurement *measurement) {
-  return is_finite(measurement->q1_lift) &&
-         is_finite(measurement->q1_rotation) &&
-         is_finite(measurement->dq1_lift) &&
-         is_finite(measurement->dq1_rotation) &&
-         is_finite(measurement->dq2_lift) &&
-         is_finite(measurement->dq2_rotation);
+static int springline_measurement_is_finite(const springline_measurement *measurement) {
+  return springline_is_finite(measurement->q1_lift) &&
+         springline_is_finite(measurement->q1_rotation) &&
+         springline_is_finite(measurement->dq1_lift) &&
+         springline_is_finite(measurement->dq1_rotation) &&
+         springline_is_finite(measurement->dq2_lift) &&
+         springline_is_finite(measurement->dq2_rotation);
 }
 
-static int command_is_finite(const springline_command *command) {
-  return is_finite(command->U_lift) &&
-         is_finite(command->U_rotation);
+static int springline_command_is_finite(const springline_command *command) {
+  return springline_is_finite(command->U_lift) &&
+         springline_is_finite(command->U_rotation);
 }
 
-static int base_is_finite(const springline_base *base) {
-  return is_finite(base->y_r1) &&
-         is_finite(base->theta_1z) &&
-         is_finite(base->theta_1x) &&
-         is_finite(base->d_y_r1) &&
-         is_finite(base->d_theta_1z) &&
-         is_finite(base->d_theta_1x) &&
-         is_finite(base->dd_y_r1) &&
-         is_finite(base->dd_theta_1z) &&
-         is_finite(base->dd_theta_1x);
+static int springline_base_is_finite(const springline_base *base) {
+  return springline_is_finite(base->y_r1) &&
+         springline_is_finite(base->theta_1z) &&
+         springline_is_finite(base->theta_1x) &&
+         springline_is_finite(base->d_y_r1) &&
+         springline_is_finite(base->d_theta_1z) &&
+         springline_is_finite(base->d_theta_1x) &&
+         springline_is_finite(base->dd_y_r1) &&
+         springline_is_finite(base->dd_theta_1z) &&
+         springline_is_finite(base->dd_theta_1x);
 }
 
 /* Looks at what stands before the limits, for a limit turns NaN and infinity into a number. */
-static int control_is_finite(const springline_diagnostics *diagnostics) {
-  return is_finite(diagnostics->e_lift) &&
-         is_finite(diagnostics->e_rotation) &&
-         is_finite(diagnostics->sigma_lift) &&
-         is_finite(diagnostics->sigma_rotation) &&
-         is_finite(diagnostics->U_s_lift) &&
-         is_finite(diagnostics->U_s_rotation) &&
-         is_finite(diagnostics->U_f_lift) &&
-         is_finite(diagnostics->U_f_rotation) &&
-         is_finite(diagnostics->U_s_lift + diagnostics->U_f_lift) &&
-         is_finite(diagnostics->U_s_rotation + diagnostics->U_f_rotation);
+static int springline_control_is_finite(const springline_diagnostics *diagnostics) {
+  return springline_is_finite(diagnostics->e_lift) &&
+         springline_is_finite(diagnostics->e_rotation) &&
+         springline_is_finite(diagnostics->sigma_lift) &&
+         springline_is_finite(diagnostics->sigma_rotation) &&
+         springline_is_finite(diagnostics->U_s_lift) &&
+         springline_is_finite(diagnostics->U_s_rotation) &&
+         springline_is_finite(diagnostics->U_f_lift) &&
+         springline_is_finite(diagnostics->U_f_rotation) &&
+         springline_is_finite(diagnostics->U_s_lift + diagnostics->U_f_lift) &&
+         springline_is_finite(diagnostics->U_s_rotation + diagnostics->U_f_rotation);
 }
 
-static int state_is_finite(const real *x) {
+static int springline_state_is_finite(const springline_real *x) {
   int i;
   for (i = 0; i < 8; i++) {
-    if (!is_finite(x[i])) return 0;
+    if (!springline_is_finite(x[i])) return 0;
   }
   return 1;
 }
 
-static int is_ready(const springline_controller *controller) { return controller->ready == READY; }
+static int springline_is_ready(const springline_controller *controller) {
+  return controller->ready == SPRINGLINE_READY;
+}
 
 /* What is wrong with a configuration, before anything of it is taken. */
-static int judge(const springline_config *config) {
+static int springline_judge(const springline_config *config) {
   if (config == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (config->fallback != SPRINGLINE_FALLBACK_ZERO && config->fallback != SPRINGLINE_FALLBACK_LAST) {
     return SPRINGLINE_BAD_FALLBACK;
@@ -394,7 +398,7 @@ static int judge(const springline_config *config) {
   return SPRINGLINE_OK;
 }
 
-static void take(springline_controller *controller, const springline_config *config) {
+static void springline_take(springline_controller *controller, const springline_config *config) {
   controller->config = *config;
 }
 
@@ -404,54 +408,54 @@ int springline_init(springline_controller *controller, const springline_config *
   int status;
   if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
   controller->ready = 0; /* what was there before may be anything, so a refusal leaves nothing of it */
-  controller->last = no_command;
-  status = judge(config);
+  controller->last = springline_no_command;
+  status = springline_judge(config);
   if (status != SPRINGLINE_OK) return status;
-  take(controller, config);
-  controller->ready = READY;
+  springline_take(controller, config);
+  controller->ready = SPRINGLINE_READY;
   return SPRINGLINE_OK;
 }
 
 int springline_set_parameters(springline_controller *controller, const springline_config *config) {
   int status;
   if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  status = judge(config);
-  if (status == SPRINGLINE_OK) take(controller, config);
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  status = springline_judge(config);
+  if (status == SPRINGLINE_OK) springline_take(controller, config);
   return status;
 }
 
 int springline_reset(springline_controller *controller) {
   if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  controller->last = no_command;
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  controller->last = springline_no_command;
   return SPRINGLINE_OK;
 }
 
 int springline_step(springline_controller *controller, const springline_reference *reference,
                     const springline_measurement *measurement, springline_command *command,
                     springline_diagnostics *diagnostics) {
-  springline_command wished = no_command;
-  springline_diagnostics seen = no_diagnostics;
+  springline_command wished = springline_no_command;
+  springline_diagnostics seen = springline_no_diagnostics;
   int status = SPRINGLINE_OK;
   if (controller == NULL || reference == NULL || measurement == NULL || command == NULL) {
     status = SPRINGLINE_NULL_ARGUMENT;
-  } else if (!is_ready(controller)) {
+  } else if (!springline_is_ready(controller)) {
     status = SPRINGLINE_NOT_INITIALIZED;
-  } else if (!reference_is_finite(reference)) {
+  } else if (!springline_reference_is_finite(reference)) {
     status = SPRINGLINE_BAD_REFERENCE;
-  } else if (!measurement_is_finite(measurement)) {
+  } else if (!springline_measurement_is_finite(measurement)) {
     status = SPRINGLINE_BAD_MEASUREMENT;
   } else {
-    control(controller, reference, measurement, &wished, &seen);
-    if (!control_is_finite(&seen)) status = SPRINGLINE_OVERFLOW;
+    springline_evaluate_control(controller, reference, measurement, &wished, &seen);
+    if (!springline_control_is_finite(&seen)) status = SPRINGLINE_OVERFLOW;
   }
   if (status == SPRINGLINE_OK) {
     controller->last = wished;
   } else {
-    const int hold = controller != NULL && is_ready(controller) && controller->config.fallback == SPRINGLINE_FALLBACK_LAST;
-    wished = hold ? controller->last : no_command;
-    seen = no_diagnostics;
+    const int ready = controller != NULL && springline_is_ready(controller);
+    wished = ready && controller->config.fallback == SPRINGLINE_FALLBACK_LAST ? controller->last : springline_no_command;
+    seen = springline_no_diagnostics;
   }
   if (command != NULL) *command = wished;
   if (diagnostics != NULL) *diagnostics = seen;
@@ -460,16 +464,18 @@ int springline_step(springline_controller *controller, const springline_referenc
 
 int springline_plant_step(const springline_controller *controller, springline_state *state,
                           const springline_command *command, const springline_base *base, springline_real step) {
-  static const real node[4] = {0.0, 0.5, 0.5, 1.0};
-  static const real weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  static const springline_real node[4] = {0.0, 0.5, 0.5, 1.0};
+  static const springline_real weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
+                                            1.0 / 6.0};
   static const int when[4] = {0, 1, 1, 2};
-  real x[8], at[8], next[8], slope[8];
+  springline_real x[8], at[8], next[8], slope[8];
   int stage, i;
   if (controller == NULL || state == NULL || command == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  if (!is_finite(step) || step <= 0.0 || !command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  if (!springline_is_finite(step) || step <= 0.0) return SPRINGLINE_BAD_PLANT_INPUT;
+  if (!springline_command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
   for (i = 0; base != NULL && i < 3; i++) {
-    if (!base_is_finite(&base[i])) return SPRINGLINE_BAD_PLANT_INPUT;
+    if (!springline_base_is_finite(&base[i])) return SPRINGLINE_BAD_PLANT_INPUT;
   }
   x[0] = state->q1_lift;
   x[1] = state->q1_rotation;
@@ -479,20 +485,21 @@ int springline_plant_step(const springline_controller *controller, springline_st
   x[5] = state->q2_rotation;
   x[6] = state->dq2_lift;
   x[7] = state->dq2_rotation;
-  if (!state_is_finite(x)) return SPRINGLINE_BAD_PLANT_INPUT;
+  if (!springline_state_is_finite(x)) return SPRINGLINE_BAD_PLANT_INPUT;
   for (i = 0; i < 8; i++) {
     at[i] = x[i];
     next[i] = x[i];
   }
   for (stage = 0; stage < 4; stage++) {
-    const real advance = stage < 3 ? node[stage + 1] * step : 0.0, gain = weight[stage] * step;
-    plant(controller, base != NULL ? &base[when[stage]] : &base_at_rest, at, command, slope);
+    const springline_real advance = stage < 3 ? node[stage + 1] * step : 0.0, gain = weight[stage] * step;
+    const springline_base *motion = base != NULL ? &base[when[stage]] : &springline_base_at_rest;
+    springline_evaluate_plant(controller, motion, at, command, slope);
     for (i = 0; i < 8; i++) {
       next[i] = next[i] + gain * slope[i];
       at[i] = x[i] + advance * slope[i];
     }
   }
-  if (!state_is_finite(next)) return SPRINGLINE_DIVERGED;
+  if (!springline_state_is_finite(next)) return SPRINGLINE_DIVERGED;
   state->q1_lift = next[0];
   state->q1_rotation = next[1];
   state->dq1_lift = next[2];
@@ -506,7 +513,7 @@ int springline_plant_step(const springline_controller *controller, springline_st
 
 int springline_start(const springline_controller *controller, springline_state *state) {
   if (controller == NULL || state == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
   state->q1_lift = 0.8;
   state->q1_rotation = 0.5;
   state->dq1_lift = 0.0;
@@ -521,8 +528,8 @@ int springline_start(const springline_controller *controller, springline_state *
 int springline_signals(const springline_controller *controller, springline_real t, springline_reference *reference,
                        springline_base *base) {
   if (controller == NULL || reference == NULL || base == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  if (!is_finite(t)) return SPRINGLINE_BAD_TIME;
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  if (!springline_is_finite(t)) return SPRINGLINE_BAD_TIME;
   {
     const double a0 = 3.141592653589793 * t;
     const double a1 = a0 + 0.0;

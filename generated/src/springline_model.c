@@ -104,6 +104,7 @@
  */
 
 #if defined(__GNUC__) /* the convention has five arguments, whether a function needs them or not */
+#pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
@@ -173,7 +174,7 @@ static casadi_real casadi_sq(casadi_real x) { return x*x;}
 
 static casadi_real casadi_fmax(casadi_real x, casadi_real y) {
 /* Pre-c99 compatibility */
-#if __STDC_VERSION__ < 199901L
+#if !defined(__cplusplus) && __STDC_VERSION__ < 199901L
   return x>y ? x : y;
 #else
   return fmax(x, y);
@@ -182,7 +183,7 @@ static casadi_real casadi_fmax(casadi_real x, casadi_real y) {
 
 static casadi_real casadi_fabs(casadi_real x) {
 /* Pre-c99 compatibility */
-#if __STDC_VERSION__ < 199901L
+#if !defined(__cplusplus) && __STDC_VERSION__ < 199901L
   return x>0 ? x : -x;
 #else
   return fabs(x);
@@ -191,7 +192,7 @@ static casadi_real casadi_fabs(casadi_real x) {
 
 static casadi_real casadi_fmin(casadi_real x, casadi_real y) {
 /* Pre-c99 compatibility */
-#if __STDC_VERSION__ < 199901L
+#if !defined(__cplusplus) && __STDC_VERSION__ < 199901L
   return x<y ? x : y;
 #else
   return fmin(x, y);
@@ -200,7 +201,7 @@ static casadi_real casadi_fmin(casadi_real x, casadi_real y) {
 
 static casadi_real casadi_log1p(casadi_real x) {
 /* Pre-c99 compatibility */
-#if __STDC_VERSION__ < 199901L
+#if !defined(__cplusplus) && __STDC_VERSION__ < 199901L
   return log(1+x);
 #else
   return log1p(x);
@@ -2492,3 +2493,61 @@ CASADI_SYMBOL_EXPORT int springline_law_power_work_bytes(casadi_int *sz_arg, cas
 }
 
 
+
+/* Another file may follow in the same translation unit. */
+#undef CASADI_NAMESPACE_CONCAT
+#undef _CASADI_NAMESPACE_CONCAT
+#undef CASADI_PREFIX
+#undef casadi_f0
+#undef casadi_f1
+#undef casadi_f10
+#undef casadi_f11
+#undef casadi_f12
+#undef casadi_f13
+#undef casadi_f2
+#undef casadi_f3
+#undef casadi_f4
+#undef casadi_f5
+#undef casadi_f6
+#undef casadi_f7
+#undef casadi_f8
+#undef casadi_f9
+#undef casadi_fabs
+#undef casadi_fmax
+#undef casadi_fmin
+#undef casadi_log1p
+#undef casadi_s0
+#undef casadi_s2
+#undef casadi_s3
+#undef casadi_s4
+#undef casadi_s5
+#undef casadi_sign
+#undef casadi_sq
+#undef sin
+#undef cos
+#undef tan
+#undef exp
+#undef expm1
+#undef log
+#undef log1p
+#undef pow
+#undef sqrt
+#undef fabs
+#undef fmin
+#undef fmax
+#undef floor
+#undef ceil
+#undef copysign
+#undef hypot
+#undef sinh
+#undef cosh
+#undef tanh
+#undef asin
+#undef acos
+#undef atan
+#undef atan2
+#undef SL_CASADI_H
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif

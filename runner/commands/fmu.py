@@ -67,7 +67,8 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         others = _earlier(output, keep_edited=force)
         loaded = load_scenario(scenario)
         stem = re.sub(r"\W", "_", Path(scenario).stem, flags=re.ASCII)
-        identifier = name or f"{stem if stem[:1].isalpha() else f'scenario_{stem}'}_{part}_fmi{version}"
+        begin = stem if stem[:1].isalpha() else f"scenario_{stem}"
+        identifier = name or re.sub("_+", "_", f"{begin}_{part}_fmi{version}")
         try:
             content = fmu(
                 loaded.structure(),

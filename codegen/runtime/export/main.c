@@ -31,7 +31,7 @@ int main(int argc, char **argv) {
   int i, j;
   int status = springline_init(&controller, &springline_default_config);
   if (status == SPRINGLINE_OK) status = springline_start(&controller, &state);
-  printf("{{csv_header}}\n");
+{{table_warning}}  printf("{{csv_header}}\n");
   for (k = 0; k <= samples && status == SPRINGLINE_OK; k++) {
     const long first = 2L * STEPS_PER_SAMPLE * k; /* in half steps */
     status = springline_signals(&controller, half_step_time(first), &reference, &base[0]);

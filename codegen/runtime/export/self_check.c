@@ -15,7 +15,8 @@
 
 typedef {{bits_type}} bits;
 
-enum { CONTROL_IN = {{control_in}}, CONTROL_OUT = {{control_out}}, COMMAND_OUT = {{command_out}}, PLANT_IN = {{plant_in}}, PLANT_OUT = {{plant_out}}, LINE = 4096 };
+enum { CONTROL_IN = {{control_in}}, CONTROL_OUT = {{control_out}}, COMMAND_OUT = {{command_out}}, MODEL_OUT = {{model_out}},
+       PLANT_IN = {{plant_in}}, PLANT_OUT = {{plant_out}}, LINE = 4096 };
 
 static const char *const control_outputs[CONTROL_OUT] = { {{control_output_names}} };
 static const char *const plant_outputs[PLANT_OUT] = { {{plant_output_names}} };
@@ -109,9 +110,9 @@ static int replay_retuning(springline_controller *controller, long line, const s
 
 /* The same inputs through the function that CasADi printed. */
 static int replay_model(long line, const springline_real *in, const springline_real *expected) {
-  springline_real got[CONTROL_OUT];
+  springline_real got[MODEL_OUT];
 {{model_call}}
-  return differs("springline_control", line, control_outputs, CONTROL_OUT, expected, got);
+  return differs("springline_control", line, control_outputs, MODEL_OUT, expected, got);
 }
 
 static int replay_plant(const springline_controller *controller, long line, const springline_real *in,

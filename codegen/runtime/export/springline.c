@@ -4,68 +4,69 @@
 
 #include "{{math_header}}"
 
-typedef springline_real real;
-
-enum { READY = 0x5a17 }; /* springline_init has been here */
+enum { SPRINGLINE_READY = 0x5a17 }; /* springline_init has been here */
 
 const springline_config springline_default_config = {{default_config}};
 
-static const springline_command no_command = {{zero_command}};
-static const springline_diagnostics no_diagnostics = {{zero_diagnostics}};
-static const springline_base base_at_rest = {{zero_base}};
+static const springline_command springline_no_command = {{zero_command}};
+static const springline_diagnostics springline_no_diagnostics = {{zero_diagnostics}};
+static const springline_base springline_base_at_rest = {{zero_base}};
 
 /* ---- the model, printed from the frozen expressions ------------------------------------------------------- */
 
 {{derive}}/* {{control_operations}} operations */
-static void control(const springline_controller *controller, const springline_reference *reference,
-                    const springline_measurement *measurement, springline_command *command,
-                    springline_diagnostics *diagnostics) {
+static void springline_evaluate_control(const springline_controller *controller, const springline_reference *reference,
+                                        const springline_measurement *measurement, springline_command *command,
+                                        springline_diagnostics *diagnostics) {
 {{control}}
 }
 
 /* dx/dt; {{plant_operations}} operations */
-static void plant(const springline_controller *controller, const springline_base *base, const real *x,
-                  const springline_command *command, real *dx) {
+static void springline_evaluate_plant(const springline_controller *controller, const springline_base *base,
+                                      const springline_real *x, const springline_command *command,
+                                      springline_real *dx) {
 {{plant}}
 }
 
 /* ---- checks ------------------------------------------------------------------------------------------------ */
 
-static int is_finite(real x) { return {{math}}_isfinite(x); }
+static int springline_is_finite(springline_real x) { return {{math}}_isfinite(x); }
 
-static int reference_is_finite(const springline_reference *reference) {
+static int springline_reference_is_finite(const springline_reference *reference) {
   return {{reference_is_finite}};
 }
 
-static int measurement_is_finite(const springline_measurement *measurement) {
+static int springline_measurement_is_finite(const springline_measurement *measurement) {
   return {{measurement_is_finite}};
 }
 
-static int command_is_finite(const springline_command *command) {
+static int springline_command_is_finite(const springline_command *command) {
   return {{command_is_finite}};
 }
 
-static int base_is_finite(const springline_base *base) {
+static int springline_base_is_finite(const springline_base *base) {
   return {{base_is_finite}};
 }
 
 /* Looks at what stands before the limits, for a limit turns NaN and infinity into a number. */
-static int control_is_finite(const springline_diagnostics *diagnostics) {
+static int springline_control_is_finite(const springline_diagnostics *diagnostics) {
   return {{control_is_finite}};
 }
 
-static int state_is_finite(const real *x) {
+static int springline_state_is_finite(const springline_real *x) {
   int i;
   for (i = 0; i < {{states}}; i++) {
-    if (!is_finite(x[i])) return 0;
+    if (!springline_is_finite(x[i])) return 0;
   }
   return 1;
 }
 
-{{parameters_check}}static int is_ready(const springline_controller *controller) { return controller->ready == READY; }
+{{parameters_check}}static int springline_is_ready(const springline_controller *controller) {
+  return controller->ready == SPRINGLINE_READY;
+}
 
 /* What is wrong with a configuration, before anything of it is taken. */
-static int judge(const springline_config *config) {
+static int springline_judge(const springline_config *config) {
   if (config == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (config->fallback != SPRINGLINE_FALLBACK_ZERO && config->fallback != SPRINGLINE_FALLBACK_LAST) {
     return SPRINGLINE_BAD_FALLBACK;
@@ -73,7 +74,7 @@ static int judge(const springline_config *config) {
 {{judge_parameters}}  return SPRINGLINE_OK;
 }
 
-static void take(springline_controller *controller, const springline_config *config) {
+static void springline_take(springline_controller *controller, const springline_config *config) {
   controller->config = *config;
 {{take_derived}}}
 
@@ -83,54 +84,54 @@ int springline_init(springline_controller *controller, const springline_config *
   int status;
   if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
   controller->ready = 0; /* what was there before may be anything, so a refusal leaves nothing of it */
-  controller->last = no_command;
-  status = judge(config);
+  controller->last = springline_no_command;
+  status = springline_judge(config);
   if (status != SPRINGLINE_OK) return status;
-  take(controller, config);
-  controller->ready = READY;
+  springline_take(controller, config);
+  controller->ready = SPRINGLINE_READY;
   return SPRINGLINE_OK;
 }
 
 int springline_set_parameters(springline_controller *controller, const springline_config *config) {
   int status;
   if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  status = judge(config);
-  if (status == SPRINGLINE_OK) take(controller, config);
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  status = springline_judge(config);
+  if (status == SPRINGLINE_OK) springline_take(controller, config);
   return status;
 }
 
 int springline_reset(springline_controller *controller) {
   if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  controller->last = no_command;
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  controller->last = springline_no_command;
   return SPRINGLINE_OK;
 }
 
 int springline_step(springline_controller *controller, const springline_reference *reference,
                     const springline_measurement *measurement, springline_command *command,
                     springline_diagnostics *diagnostics) {
-  springline_command wished = no_command;
-  springline_diagnostics seen = no_diagnostics;
+  springline_command wished = springline_no_command;
+  springline_diagnostics seen = springline_no_diagnostics;
   int status = SPRINGLINE_OK;
   if (controller == NULL || reference == NULL || measurement == NULL || command == NULL) {
     status = SPRINGLINE_NULL_ARGUMENT;
-  } else if (!is_ready(controller)) {
+  } else if (!springline_is_ready(controller)) {
     status = SPRINGLINE_NOT_INITIALIZED;
-  } else if (!reference_is_finite(reference)) {
+  } else if (!springline_reference_is_finite(reference)) {
     status = SPRINGLINE_BAD_REFERENCE;
-  } else if (!measurement_is_finite(measurement)) {
+  } else if (!springline_measurement_is_finite(measurement)) {
     status = SPRINGLINE_BAD_MEASUREMENT;
   } else {
-    control(controller, reference, measurement, &wished, &seen);
-    if (!control_is_finite(&seen)) status = SPRINGLINE_OVERFLOW;
+    springline_evaluate_control(controller, reference, measurement, &wished, &seen);
+    if (!springline_control_is_finite(&seen)) status = SPRINGLINE_OVERFLOW;
   }
   if (status == SPRINGLINE_OK) {
     controller->last = wished;
   } else {
-    const int hold = controller != NULL && is_ready(controller) && controller->config.fallback == SPRINGLINE_FALLBACK_LAST;
-    wished = hold ? controller->last : no_command;
-    seen = no_diagnostics;
+    const int ready = controller != NULL && springline_is_ready(controller);
+    wished = ready && controller->config.fallback == SPRINGLINE_FALLBACK_LAST ? controller->last : springline_no_command;
+    seen = springline_no_diagnostics;
   }
   if (command != NULL) *command = wished;
   if (diagnostics != NULL) *diagnostics = seen;
@@ -139,39 +140,42 @@ int springline_step(springline_controller *controller, const springline_referenc
 
 int springline_plant_step(const springline_controller *controller, springline_state *state,
                           const springline_command *command, const springline_base *base, springline_real step) {
-  static const real node[4] = {0.0{{f}}, 0.5{{f}}, 0.5{{f}}, 1.0{{f}}};
-  static const real weight[4] = {1.0{{f}} / 6.0{{f}}, 1.0{{f}} / 3.0{{f}}, 1.0{{f}} / 3.0{{f}}, 1.0{{f}} / 6.0{{f}}};
+  static const springline_real node[4] = {0.0{{f}}, 0.5{{f}}, 0.5{{f}}, 1.0{{f}}};
+  static const springline_real weight[4] = {1.0{{f}} / 6.0{{f}}, 1.0{{f}} / 3.0{{f}}, 1.0{{f}} / 3.0{{f}},
+                                            1.0{{f}} / 6.0{{f}}};
   static const int when[4] = {0, 1, 1, 2};
-  real x[{{states}}], at[{{states}}], next[{{states}}], slope[{{states}}];
+  springline_real x[{{states}}], at[{{states}}], next[{{states}}], slope[{{states}}];
   int stage, i;
   if (controller == NULL || state == NULL || command == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  if (!is_finite(step) || step <= 0.0{{f}} || !command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  if (!springline_is_finite(step) || step <= 0.0{{f}}) return SPRINGLINE_BAD_PLANT_INPUT;
+  if (!springline_command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
   for (i = 0; base != NULL && i < 3; i++) {
-    if (!base_is_finite(&base[i])) return SPRINGLINE_BAD_PLANT_INPUT;
+    if (!springline_base_is_finite(&base[i])) return SPRINGLINE_BAD_PLANT_INPUT;
   }
 {{state_to_x}}
-  if (!state_is_finite(x)) return SPRINGLINE_BAD_PLANT_INPUT;
+  if (!springline_state_is_finite(x)) return SPRINGLINE_BAD_PLANT_INPUT;
   for (i = 0; i < {{states}}; i++) {
     at[i] = x[i];
     next[i] = x[i];
   }
   for (stage = 0; stage < 4; stage++) {
-    const real advance = stage < 3 ? node[stage + 1] * step : 0.0{{f}}, gain = weight[stage] * step;
-    plant(controller, base != NULL ? &base[when[stage]] : &base_at_rest, at, command, slope);
+    const springline_real advance = stage < 3 ? node[stage + 1] * step : 0.0{{f}}, gain = weight[stage] * step;
+    const springline_base *motion = base != NULL ? &base[when[stage]] : &springline_base_at_rest;
+    springline_evaluate_plant(controller, motion, at, command, slope);
     for (i = 0; i < {{states}}; i++) {
       next[i] = next[i] + gain * slope[i];
       at[i] = x[i] + advance * slope[i];
     }
   }
-  if (!state_is_finite(next)) return SPRINGLINE_DIVERGED;
+  if (!springline_state_is_finite(next)) return SPRINGLINE_DIVERGED;
 {{next_to_state}}
   return SPRINGLINE_OK;
 }
 
 int springline_start(const springline_controller *controller, springline_state *state) {
   if (controller == NULL || state == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
 {{start}}
   return SPRINGLINE_OK;
 }
@@ -179,8 +183,8 @@ int springline_start(const springline_controller *controller, springline_state *
 int springline_signals(const springline_controller *controller, springline_real t, springline_reference *reference,
                        springline_base *base) {
   if (controller == NULL || reference == NULL || base == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (!is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  if (!is_finite(t)) return SPRINGLINE_BAD_TIME;
+  if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
+  if (!springline_is_finite(t)) return SPRINGLINE_BAD_TIME;
   {
 {{signals}}
   }

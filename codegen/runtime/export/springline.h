@@ -1,6 +1,8 @@
 #ifndef SPRINGLINE_H
 #define SPRINGLINE_H
 
+#include <stdint.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -33,7 +35,8 @@ typedef struct springline_command {
 {{command_fields}}
 } springline_command;
 
-/* Why: tracking error e, sliding variable sigma, the two parts of U, and whether U_max has limited it (0 or 1). */
+/* Why: tracking error e, sliding variable sigma, the two parts of U, and whether a limit was met (0 or 1): saturated
+ * where U_max has limited U, a_limited where a_max has limited the acceleration that the reaching law wished. */
 typedef struct springline_diagnostics {
 {{diagnostics_fields}}
 } springline_diagnostics;
@@ -49,7 +52,7 @@ typedef struct springline_base {
 } springline_base;
 
 {{parameter_struct}}typedef struct springline_config {
-  int fallback; /* SPRINGLINE_FALLBACK_ZERO or SPRINGLINE_FALLBACK_LAST */
+  int32_t fallback; /* SPRINGLINE_FALLBACK_ZERO or SPRINGLINE_FALLBACK_LAST */
 {{config_parameters}}} springline_config;
 
 /* {{default_config_meaning}} */
@@ -59,7 +62,7 @@ extern const springline_config springline_default_config;
 typedef struct springline_controller {
   springline_config config;
 {{controller_derived}}  springline_command last;
-  int ready;
+  int32_t ready;
 } springline_controller;
 
 /*
@@ -78,9 +81,10 @@ int springline_set_parameters(springline_controller *controller, const springlin
 int springline_reset(springline_controller *controller);
 
 /*
- * Computes the command for one sample. The law keeps no state from step to step, so any sample rate will do; for the
- * default drive 1 kHz is enough. Whatever happens *command is set: to the fallback if the status is not SPRINGLINE_OK.
- * diagnostics may be NULL; it is zero if the status is not SPRINGLINE_OK.
+ * Computes the command for one sample. The law keeps no state from step to step, but the arm does: sampled too slowly,
+ * or with its command too late, it leaves its reference or diverges (README.md has figures). Whatever happens *command is
+ * set: to the fallback if the status is not SPRINGLINE_OK. diagnostics may be NULL; it is zero if the status is not
+ * SPRINGLINE_OK.
  */
 int springline_step(springline_controller *controller, const springline_reference *reference,
                     const springline_measurement *measurement, springline_command *command,
