@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from importlib.metadata import version as installed
 from xml.etree import ElementTree as ET
 
 from springline.codegen.fmu_settings import FmiVersion, Settings
 from springline.codegen.fmu_units import base_exponents
-from springline.codegen.fmu_variables import Interface, Variable, closed_range
+from springline.codegen.fmu_variables import Interface, Variable
 
 _CAPABILITIES = {
     2: {
@@ -83,7 +82,9 @@ def model_description(
     ET.SubElement(
         categories, "Category", {"name": "logStatusError", "description": "what was refused or went wrong, and why"}
     )
-    step = settings.period or settings.step
+    # Controller and plant may meet in a master that exchanges values after the step, and so delays the command by it:
+    # the sample period is often too long for that.
+    step = (settings.period or settings.step) if interface.part == "loop" else settings.step
     experiment = {"startTime": "0.0", "stopTime": repr(settings.duration), "stepSize": repr(step)}
     ET.SubElement(root, "DefaultExperiment", experiment)
     variables = ET.SubElement(root, "ModelVariables")
@@ -128,7 +129,7 @@ def _variable_3(parent: ET.Element, reference: int, variable: Variable) -> None:
 def _common(variable: Variable) -> dict[str, str]:
     text = variable.meaning
     if variable.causality == "parameter":
-        text += f"; {variable.bounds}"
+        text += f"; {variable.expected}"
     return {"description": text, "causality": variable.causality, "variability": variable.variability}
 
 
@@ -137,10 +138,10 @@ def _numbers(variable: Variable) -> dict[str, str]:
         return {}
     attributes = {"unit": variable.unit}
     if variable.causality == "parameter":
-        low, high = closed_range(variable.bounds)
+        low, high = variable.closed_range
         attributes |= {name: repr(value) for name, value in (("min", low), ("max", high)) if value is not None}
     if variable.start is not None:
-        attributes["start"] = "INF" if math.isinf(variable.start) else repr(variable.start)
+        attributes["start"] = repr(variable.start)
     return attributes
 
 

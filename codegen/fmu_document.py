@@ -6,7 +6,7 @@ from html import escape
 
 from springline.codegen.export import Export, provenance
 from springline.codegen.fmu_settings import FmiVersion, Settings
-from springline.codegen.fmu_variables import Interface, base_is_input
+from springline.codegen.fmu_variables import NO_LIMIT, Interface, base_is_input
 
 _STYLE = """
 body { font: 16px/1.5 sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em; color: #1b2733; }
@@ -33,18 +33,22 @@ def document(
 ) -> bytes:
     """The page, UTF-8."""
     structure = export.system.structure
+    unlimited = any(variable.bounds.infinite for variable in interface.variables)
     facts = [
         f"FMI {version}.0 for Co-Simulation, model identifier <code>{identifier}</code>.",
         f"Mechanism {structure.mechanism}, control law {structure.law}.",
         *_stepping(export, interface, settings),
-        "Communication steps may have any length and may change.",
+        "Communication steps may have any length and may change. Time counts from the start time of the experiment"
+        f"{', the scenario with it' if interface.part != 'controller' else ''}; a start time at which doubles are more "
+        "than a hundredth of a step apart is an error.",
         "A parameter out of its range, an input that is not finite and a plant that leaves the finite numbers give an "
-        "FMI error with a message in the log category <code>logStatusError</code>; a value that is refused changes "
+        "FMI error with a message in the log category <code>logStatusError</code>; a call that is refused changes "
         "nothing. After an error of a step, reset the instance or restore a state.",
         "Parameters are those of the controller's model of the arm (mechanism, drive, control) and, apart from them, "
         "those of the arm itself (plant): to change both, set both."
         if interface.part == "loop"
         else "Parameters are called as in the scenario.",
+        *([f"{NO_LIMIT:g} and greater numbers mean that there is no limit."] if unlimited else []),
         "For a static library, compile <code>sources/all.c</code> as C99 with "
         f"<code>-DFMI{version}_FUNCTION_PREFIX={identifier}_</code>; for a shared one leave the prefix undefined.",
     ]
@@ -60,7 +64,7 @@ def document(
                 f"<code>{escape(v.name)}</code>",
                 escape("true or false" if v.boolean else v.unit),
                 escape(v.meaning),
-                *([repr(v.start), escape(str(v.bounds)), v.variability] if more else []),
+                *([repr(v.start), escape(v.expected), v.variability] if more else []),
             ]
             for v in chosen
         ]
@@ -90,9 +94,15 @@ def document(
 def _stepping(export: Export, interface: Interface, settings: Settings) -> list[str]:
     sampled = f"sampled every {settings.period:g} s and held in between" if settings.period else ""
     if interface.part == "controller":
-        if sampled:
-            return [f"The command is {sampled}; at a sample it belongs to the inputs of that time (feedthrough)."]
-        return ["The command belongs to the inputs of its own time (feedthrough); the law has no state."]
+        return [
+            f"The command is {sampled}; at a sample it belongs to the inputs of that time (feedthrough)."
+            if sampled
+            else "The command belongs to the inputs of its own time (feedthrough); the law has no state.",
+            "At a communication point, set the inputs and get the command before the plant steps. A tool that "
+            "exchanges values only after a step delays the command by that step, and a delay can make the loop "
+            f"unstable: choose a step as short as the default experiment's, {settings.step:g} s, or one of which half "
+            "gives the same result.",
+        ]
     facts = [
         f"The plant is integrated by classical Runge-Kutta steps of {settings.step:g} s, which end at whole multiples "
         "of it; a communication point in between cuts a step in two. Inputs are held over a communication step."

@@ -17,12 +17,11 @@ class Settings:
     step      of the plant's integrator, s
     period    sample period of the control, a whole number of steps, s; 0 for continuous control
     bound     largest |x_i| of the plant, SI units
-    since, until  where the scenario's signals begin and end, s
+    until     where the scenario's signals end, s
     """
 
     duration: float
     step: float
     period: float = 0.0
     bound: float = 1e6
-    since: float = -math.inf
     until: float = math.inf

@@ -12,7 +12,7 @@ from springline.codegen.baking import print_baked
 from springline.codegen.export import Export, comment, provenance
 from springline.codegen.export_text import text_files
 from springline.codegen.fmu_settings import FmiVersion, Settings
-from springline.codegen.fmu_variables import Interface, Variable, base_is_input
+from springline.codegen.fmu_variables import NO_LIMIT, Interface, Variable, base_is_input
 from springline.codegen.kernel import Table
 from springline.codegen.names import check_files
 from springline.codegen.scalar import literal
@@ -41,7 +41,8 @@ def sources(
     files["sl_math.h"] = (runtime / "sl_math.h").read_bytes()
     for name in _HEADERS[version]:
         files[name] = (runtime / "fmu" / name).read_bytes()
-    fixed = ["instance.h", f"fmi{version}.c", f"{part}.c", *([] if part == "controller" else ["stepping.h"])]
+    steps = [f"{part}.c", *([] if part == "controller" else ["stepping.c"])]
+    fixed = ["state.h", *steps, "instance.h", f"fmi{version}.c"]
     printed = _functions(export, interface, settings, bool(tables))
     after = []
     if printed:
@@ -59,7 +60,7 @@ def sources(
         glue = _glue(export, typed, interface, settings, bool(tables))
         files["fmu_glue.h"] = (comment(provenance(export)) + _named(glue, stem)).encode()
         after.append("fmu_glue.h")
-    includes = ["fmu_model.h", f"fmi{version}.c", *after, f"{part}.c", f"{stem}.c"]
+    includes = ["fmu_model.h", "state.h", *after, *steps, f"fmi{version}.c", f"{stem}.c"]
     files["all.c"] = (
         comment([*provenance(export), "", "The whole FMU; compile this file alone, as C99."])
         + "".join(f'#include "{name}"\n' for name in includes)
@@ -87,10 +88,10 @@ def _model(
     part, system = interface.part, export.system
     if part == "controller":  # its signals come from outside
         grid, grid_meaning = settings.period, "s, sample period; 0: at every time"
-        since, until = -math.inf, math.inf
+        until = math.inf
     else:
         grid, grid_meaning = settings.step, "s, step of the integrator"
-        since, until = settings.since, settings.until
+        until = settings.until
     hold = round(settings.period / settings.step)
     lines = [
         "#include <stdint.h>",
@@ -104,8 +105,8 @@ def _model(
             for name, value, meaning in (
                 ("FMU_GRID", grid, grid_meaning),
                 ("FMU_BOUND", settings.bound, "the plant may not leave it, SI"),
-                ("FMU_SINCE", since, "s, where the scenario's signals begin"),
-                ("FMU_UNTIL", until, "s, where they end"),
+                ("FMU_UNTIL", until, "s since the start, where the scenario's signals end"),
+                ("FMU_NO_LIMIT", NO_LIMIT, "stands for infinity, as do greater numbers"),
             )
         ),
         f"#define FMU_HOLD {hold} /* steps per sample of the control, 0: continuous */",
@@ -148,7 +149,7 @@ def _row(variable: Variable) -> str:
     return (
         f'{{"{variable.name}", FMU_{variable.causality.upper()}, {int(variable.boolean)}, {int(variable.fixed)}, '
         f"{', '.join(numbers)}, "
-        f'{", ".join(str(int(flag)) for flag in flags)}, "{bounds}"}}'
+        f'{", ".join(str(int(flag)) for flag in flags)}, "{variable.expected}"}}'
     )
 
 
@@ -175,7 +176,9 @@ def _copies(export: Export, typed: TypedInterface, interface: Interface) -> list
         ]
     lines.append("static void fmu_get_parameters(const double *v, springline_config *config) {")
     if export.tunable:
-        lines += [f"  config->parameters.{slot.symbol} = v[{k}];" for k, slot in enumerate(export.tunable_slots)]
+        for k, slot in enumerate(export.tunable_slots):
+            value = f"v[{k}] >= FMU_NO_LIMIT ? SL_INF : v[{k}]" if slot.bounds.infinite else f"v[{k}]"
+            lines.append(f"  config->parameters.{slot.symbol} = {value};")
     else:
         lines.append("  (void)v, (void)config;")
     return [*lines, "}", ""]
@@ -246,12 +249,16 @@ def _functions(export: Export, interface: Interface, settings: Settings, tables:
 
 
 def _glue(export: Export, typed: TypedInterface, interface: Interface, settings: Settings, tables: bool) -> str:
-    """fmu_glue.h: signals and the plant's right-hand side, in the form that stepping.h and loop.c expect."""
+    """fmu_glue.h: signals and the plant's right-hand side, in the form that plant.c and loop.c expect."""
     reference, base = ([f"{name}->{field.name}" for field in typed.structures[name]] for name in ("reference", "base"))
     p = ", parameters" if export.tunable else ""
+    outside = (
+        ["  fmu_get_base(fmu->now.values + FMU_AT_BASE, base);"] if base_is_input(export.system, interface.part) else []
+    )
     lines = [
-        "static int fmu_signals(const fmu_instance *fmu, double t, springline_reference *reference,",
-        "                       springline_base *base) {",
+        "/* Reference and base motion: the scenario's, or what the importer makes of the base. */",
+        "static int fmu_surroundings(const fmu_core *fmu, double t, springline_reference *reference,",
+        "                            springline_base *base) {",
     ]
     if tables:
         lines += [
@@ -263,11 +270,17 @@ def _glue(export: Export, typed: TypedInterface, interface: Interface, settings:
             "  fmu_table_data(t, d);",
             "  (void)springline_table_signals(arg, res, 0, 0, 0);",
             *(f"  {name} = w[{k}];" for k, name in enumerate([*reference, *base])),
+            *outside,
             "  return SPRINGLINE_OK;",
             "}",
         ]
     else:
-        lines += ["  return springline_signals(&fmu->controller, t, reference, base);", "}"]
+        lines += [
+            "  const int status = springline_signals(&fmu->controller, t, reference, base);",
+            *outside,
+            "  return status;",
+            "}",
+        ]
     if _wants_slope(interface, settings):
         commands = ", ".join(f"command->{field.name}" for field in typed.structures["command"])
         third = len(base) // 3

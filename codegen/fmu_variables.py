@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import casadi as ca
@@ -19,6 +19,11 @@ Part = Literal["controller", "plant", "loop"]
 Causality = Literal["independent", "parameter", "input", "output"]
 
 PARTS: tuple[Part, ...] = ("controller", "plant", "loop")
+
+NO_LIMIT = 1e300
+"""How an FMU writes infinity, and from where on it reads it: FMI's XML has none, and its importers cannot read one."""
+
+_LEAST = 1e-300  # stands for the least number above 0, which is denormal and not every importer's to read
 
 _MEANINGS = {
     "q1d": "reference of the joint coordinate",
@@ -62,6 +67,24 @@ class Variable:
         if self.causality == "parameter":
             return "fixed" if self.fixed else "tunable"
         return "discrete" if self.boolean else "continuous"
+
+    @property
+    def expected(self) -> str:
+        """What values may be set, in words."""
+        if not self.bounds.infinite:
+            return str(self.bounds)
+        return f"{replace(self.bounds, infinite=False)} ({NO_LIMIT:g} or more means no limit)"
+
+    @property
+    def closed_range(self) -> tuple[float | None, float | None]:
+        """The least and the greatest value that FMI's inclusive min and max may name, None where there is no limit."""
+        low = None if math.isinf(self.bounds.low) else self.bounds.low
+        high = None if math.isinf(self.bounds.high) else self.bounds.high
+        if low is not None and self.bounds.low_open:
+            low = math.nextafter(low, math.inf) if low else _LEAST
+        if high is not None and self.bounds.high_open:
+            high = math.nextafter(high, -math.inf) if high else -_LEAST
+        return low, high
 
 
 @dataclass(frozen=True)
@@ -128,7 +151,8 @@ def interface(export: Export, typed: TypedInterface, part: Part) -> Interface:
     blocks = {"parameters": len(variables)}
     for slot, i in zip(export.tunable_slots, export.tunable, strict=True):
         fixed = slot.key.startswith("initial.")
-        variables.append(Variable(slot.key, slot.unit, slot.meaning, "parameter", export.values[i], slot.bounds, fixed))
+        start = min(export.values[i], NO_LIMIT) if slot.bounds.infinite else export.values[i]
+        variables.append(Variable(slot.key, slot.unit, slot.meaning, "parameter", start, slot.bounds, fixed))
     groups: Iterable[tuple[Causality, Sequence[str]]] = (("input", inputs[part]), ("output", outputs[part]))
     for causality, structures in groups:
         for structure in structures:
@@ -154,14 +178,3 @@ def _meaning(system: System, name: str) -> str:
             if name == prefix + coordinate.symbol:
                 return meaning + coordinate.key
     raise KeyError(name)
-
-
-def closed_range(bounds: Bounds) -> tuple[float | None, float | None]:
-    """The least and the greatest admissible double, None where there is no limit or infinity is admissible."""
-    low = None if math.isinf(bounds.low) else bounds.low
-    high = None if math.isinf(bounds.high) else bounds.high
-    if low is not None and bounds.low_open:
-        low = math.nextafter(low, math.inf)
-    if high is not None and bounds.high_open:
-        high = math.nextafter(high, -math.inf)
-    return low, high

@@ -4,8 +4,9 @@
     python fmu_coupling.py fmu/nominal_controller_fmi3.fmu
 
 The arm is written by hand below: rigid joints, friction, and motors whose force lags behind the command, none of which
-the controller's model has. Every millisecond the two exchange measurements and commands. Needs fmpy and NumPy; an FMU
-of FMI 2.0 does as well.
+the controller's model has. Every millisecond the two exchange measurements and commands: the command is asked for
+before the arm moves, so that it is not a step late (docs/fmu.md says what delay costs). Needs fmpy and NumPy; an FMU of
+FMI 2.0 does as well.
 """
 
 from __future__ import annotations

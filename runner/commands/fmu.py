@@ -113,7 +113,6 @@ def _settings(scenario: Scenario) -> Settings:
         step=scenario.step,
         period=float(control["period"]) if control["mode"] == "sampled" else 0.0,
         bound=scenario.bound,
-        since=max((table.t0 for table in ending), default=-math.inf),
         until=min((table.end for table in ending), default=math.inf),
     )
 

@@ -1,12 +1,15 @@
 """The paper's nominal numbers under a shake, for tests of the generated code that do without scenario files."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
+from fmi_client import SAMPLED, Client, Values, arm
 from numpy.typing import NDArray
 
+from springline.codegen.fmu import Settings
 from springline.codegen.program import Program, program
 from springline.model.system import SignalShape, Structure
 
@@ -48,3 +51,33 @@ def values_of() -> Callable[..., NDArray[np.float64]]:
         return np.array([wanted.get(slot.key, slot.default) for slot in of.system.slots])
 
     return values
+
+
+@pytest.fixture(scope="session")
+def build(
+    tmp_path_factory: pytest.TempPathFactory, shaken: Program, values_of: Values
+) -> Callable[[str, int, Settings], Path]:
+    """build(part, version, settings): the FMU file of the shaken arm."""
+    folder = tmp_path_factory.mktemp("fmu")
+
+    def built(part: str, version: int, settings: Settings = SAMPLED) -> Path:
+        kind = "sampled" if settings.period else "continuous"
+        path = folder / f"{part}_{kind}_fmi{version}.fmu"
+        if not path.exists():
+            path.write_bytes(arm(shaken, values_of(shaken), part, version, settings, path.stem))
+        return path
+
+    return built
+
+
+@pytest.fixture
+def open_fmu(tmp_path: Path) -> Iterator[Callable[[Path], Client]]:
+    clients: list[Client] = []
+
+    def opened(path: Path) -> Client:
+        clients.append(Client(path, tmp_path))
+        return clients[-1]
+
+    yield opened
+    for client in clients:
+        client.slave.freeInstance()

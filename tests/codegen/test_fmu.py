@@ -6,177 +6,46 @@ Two clients that are not ours drive them: fmpy, and the container of fmu-manipul
 from __future__ import annotations
 
 import ctypes
-import importlib.util
 import io
-import itertools
 import json
-import math
 import os
 import re
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from fmi_client import (
+    CONTINUOUS,
+    DURATION,
+    EVERY,
+    PERIOD,
+    SAMPLED,
+    STEP,
+    Build,
+    Open,
+    Values,
+    arm,
+    client_library,
+    columns,
+    driven,
+    own_run,
+    refused,
+)
 from numpy.typing import NDArray
 
 from springline.codegen import toolchain
 from springline.codegen.fmu import Settings, fmu
 from springline.codegen.fmu_units import base_exponents
-from springline.codegen.kernel import KernelOptions, LoopSettings, Table, kernel
+from springline.codegen.kernel import Table
 from springline.codegen.program import Program, program
-from springline.model.base import COORDINATES
 from springline.model.system import SignalShape, Structure
-
-STEP, PERIOD, DURATION = 1e-4, 1e-3, 0.3
-SAMPLED = Settings(duration=DURATION, step=STEP, period=PERIOD)
-CONTINUOUS = Settings(duration=DURATION, step=STEP)
-EVERY = 10  # steps per communication step
-
-Values = Callable[..., NDArray[np.float64]]
-Build = Callable[..., Path]
-
-
-def client_library(module: str) -> Any:
-    """A client that the tests need; without it they are skipped, in CI they fail."""
-    if importlib.util.find_spec(module) is not None:
-        return importlib.import_module(module)
-    reason = f"{module} is not installed: pip install 'springline[fmu,dev]'"
-    if os.environ.get("CI") == "true":
-        pytest.fail(reason)
-    pytest.skip(reason)
-
-
-@pytest.fixture(scope="session")
-def build(
-    tmp_path_factory: pytest.TempPathFactory, shaken: Program, values_of: Values
-) -> Callable[[str, int, Settings], Path]:
-    """build(part, version, settings): the FMU file of the shaken arm."""
-    folder = tmp_path_factory.mktemp("fmu")
-
-    def built(part: str, version: int, settings: Settings = SAMPLED) -> Path:
-        kind = "sampled" if settings.period else "continuous"
-        path = folder / f"{part}_{kind}_fmi{version}.fmu"
-        if not path.exists():
-            path.write_bytes(arm(shaken, values_of(shaken), part, version, settings, path.stem))
-        return path
-
-    return built
-
-
-def arm(of: Program, values: NDArray[np.float64], part: Any, version: Any, settings: Settings, name: str) -> bytes:
-    return fmu(of.system.structure, values, settings, part=part, version=version, identifier=name, name=name)
-
-
-class Client:
-    """An FMU instance in fmpy: variables by name, messages kept."""
-
-    def __init__(self, path: Path, folder: Path) -> None:
-        fmpy = client_library("fmpy")
-        self.description = fmpy.read_model_description(str(path))
-        self.two = self.description.fmiVersion == "2.0"
-        self.references = {v.name: v.valueReference for v in self.description.modelVariables}
-        self.messages: list[str] = []
-        unzipped = folder / path.stem
-        if not unzipped.exists():
-            fmpy.extract(str(path), unzipdir=str(unzipped))
-        module = importlib.import_module("fmpy.fmi2" if self.two else "fmpy.fmi3")
-        self.slave = (module.FMU2Slave if self.two else module.FMU3Slave)(
-            guid=self.description.guid,
-            unzipDirectory=str(unzipped),
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName="under test",
-        )
-        if self.two:
-            callbacks = module.fmi2CallbackFunctions()
-            callbacks.logger = module.fmi2CallbackLoggerTYPE(
-                lambda _e, _n, _s, _c, message: self.messages.append(message.decode())
-            )
-            self.slave.instantiate(callbacks=callbacks)
-        else:
-            self.slave.instantiate(logMessage=lambda _e, _s, _c, message: self.messages.append(message.decode()))
-
-    def start(self, time: float = 0.0, stop: float | None = None) -> Client:
-        if self.two:
-            self.slave.setupExperiment(startTime=time, stopTime=stop)
-            self.slave.enterInitializationMode()
-        else:
-            self.slave.enterInitializationMode(startTime=time, stopTime=stop)
-        self.slave.exitInitializationMode()
-        return self
-
-    def get(self, names: Sequence[str]) -> list[float]:
-        read = self.slave.getReal if self.two else self.slave.getFloat64
-        return list(read([self.references[name] for name in names]))
-
-    def set(self, names: Sequence[str], values: Sequence[float]) -> None:
-        write = self.slave.setReal if self.two else self.slave.setFloat64
-        write([self.references[name] for name in names], list(values))
-
-    def step(self, time: float, length: float = PERIOD) -> None:
-        self.slave.doStep(currentCommunicationPoint=time, communicationStepSize=length)
-
-    def names(self, causality: str) -> list[str]:
-        return [
-            v.name
-            for v in self.description.modelVariables
-            if v.causality == causality and v.type in ("Real", "Float64")
-        ]
-
-
-@pytest.fixture
-def open_fmu(tmp_path: Path) -> Iterator[Callable[[Path], Client]]:
-    clients: list[Client] = []
-
-    def opened(path: Path) -> Client:
-        clients.append(Client(path, tmp_path))
-        return clients[-1]
-
-    yield opened
-    for client in clients:
-        client.slave.freeInstance()
-
-
-def columns(of: Program) -> list[str]:
-    """Names of a trajectory's columns after t, in the order of loop.c."""
-    joints = [joint.name for joint in of.system.joints]
-    quantities = ("q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U")
-    return [*(f"{q}_{joint}" for q in quantities for joint in joints), *(c.symbol for c in COORDINATES)]
-
-
-def own_run(
-    of: Program,
-    values: NDArray[np.float64],
-    sampled: bool,
-    *,
-    steps: int = round(DURATION / STEP),
-    every: int = EVERY,
-    start: float = 0.0,
-    tables: Sequence[Table] = (),
-) -> NDArray[np.float64]:
-    """Our own loop's rows, without t."""
-    loop = kernel(of.system.structure, sampled, KernelOptions(width=1, groups=1))
-    settings = LoopSettings(steps=steps, step=STEP, hold=round(PERIOD / STEP), output_every=every, start_time=start)
-    trajectory = loop.run(values[None, :], settings, tables).trajectory
-    assert trajectory is not None
-    return trajectory[0, :, 1:]
-
-
-def driven(client: Client, names: Sequence[str], start: float = 0.0) -> NDArray[np.float64]:
-    """The same rows from an FMU."""
-    rows = [client.get(names)]
-    for k in range(round(DURATION / STEP) // EVERY):
-        client.step(start + k * EVERY * STEP, EVERY * STEP)
-        rows.append(client.get(names))
-    return np.array(rows)
-
 
 # --- what is in the file ---------------------------------------------------------------------------------
 
@@ -204,35 +73,12 @@ def test_contents(build: Build, version: int) -> None:
     assert any(name.startswith("binaries/") for name in names)
     experiment = root.find("DefaultExperiment")
     assert experiment is not None
-    assert (experiment.get("stopTime"), experiment.get("stepSize")) == (repr(DURATION), repr(PERIOD))
+    assert (experiment.get("stopTime"), experiment.get("stepSize")) == (repr(DURATION), repr(STEP))
     shown = re.findall(r"<td><code>([^<]*)</code></td>", page)
     tag = "ScalarVariable" if version == 2 else "*"
     described = [v.get("name") for v in root.findall(f"ModelVariables/{tag}")]
     assert sorted(shown) == sorted(name for name in described if name != "time")
     assert not re.search(r"/(?:home|root|tmp|usr)/", page)
-
-
-def test_parameters_have_units_starts_and_ranges(build: Build, shaken: Program, values_of: Values) -> None:
-    fmpy = client_library("fmpy")
-    values = dict(zip((slot.key for slot in shaken.system.slots), values_of(shaken), strict=True))
-    seen = set()
-    for part in ("controller", "plant", "loop"):
-        description = fmpy.read_model_description(str(build(part, 3)))
-        for variable in description.modelVariables:
-            if variable.causality != "parameter":
-                continue
-            slot = next(slot for slot in shaken.system.slots if slot.key == variable.name)
-            seen.add((part, slot.key))
-            assert variable.unit == slot.unit
-            assert float(variable.start) == values[slot.key]
-            for bound, outwards in ((variable.min, -math.inf), (variable.max, math.inf)):
-                if bound is not None:  # the last number that is admissible
-                    assert slot.bounds.holds(float(bound))
-                    assert not slot.bounds.holds(math.nextafter(float(bound), outwards))
-            assert variable.variability == ("fixed" if slot.key.startswith("initial.") else "tunable")
-    assert ("controller", "control.delta") in seen and ("controller", "plant.m3") not in seen
-    assert ("plant", "plant.m3") in seen and ("plant", "control.delta") not in seen
-    assert {key for part, key in seen if part == "loop"} >= {key for part, key in seen}
 
 
 def test_units_are_products_of_base_units() -> None:
@@ -301,7 +147,7 @@ def test_exactly_the_functions_of_the_standard_are_exported(
 @pytest.mark.parametrize(("version", "settings"), [(2, CONTINUOUS), (3, SAMPLED)])
 def test_loop_is_our_own_run(
     build: Build,
-    open_fmu: Callable[[Path], Client],
+    open_fmu: Open,
     shaken: Program,
     values_of: Values,
     version: int,
@@ -315,7 +161,7 @@ def test_loop_is_our_own_run(
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_controller_and_plant_are_the_sampled_run(
-    build: Build, open_fmu: Callable[[Path], Client], shaken: Program, values_of: Values, version: int
+    build: Build, open_fmu: Open, shaken: Program, values_of: Values, version: int
 ) -> None:
     controller, plant = (open_fmu(build(part, version)).start() for part in ("controller", "plant"))
     guide = open_fmu(build("loop", version, CONTINUOUS if version == 2 else SAMPLED)).start()  # for its reference
@@ -339,28 +185,32 @@ def test_controller_and_plant_are_the_sampled_run(
     np.testing.assert_array_equal(np.array(rows), expected[:, kept])
 
 
-def test_sampled_controller_holds_between_samples(build: Build, open_fmu: Callable[[Path], Client]) -> None:
-    client = open_fmu(build("controller", 3)).start()
-    commands = ["U_lift", "U_rotation"]
+@pytest.mark.parametrize("version", [2, 3])
+def test_the_proposed_step_is_stable_where_values_are_exchanged_after_it(
+    build: Build, open_fmu: Open, shaken: Program, values_of: Values, version: int
+) -> None:
+    """A master that steps first and then exchanges is a step late, which the proposed step size has to allow for."""
 
-    def command(q1: float) -> list[float]:
-        client.set(["q1_lift", "q1d_lift"], [q1, 0.3])
-        return client.get(commands)
+    def late(step: float) -> NDArray[np.float64]:
+        controller, plant = (open_fmu(build(part, version)).start() for part in ("controller", "plant"))
+        guide = open_fmu(build("loop", version, CONTINUOUS if version == 2 else SAMPLED)).start()
+        inputs, commands = controller.names("input"), plant.names("input")
+        sources = [plant if name in plant.references else guide for name in inputs]
+        for k in range(round(DURATION / step)):
+            given = controller.get(commands)  # belongs to the inputs of one step ago
+            controller.set(inputs, [source.get([name])[0] for source, name in zip(sources, inputs, strict=True)])
+            plant.set(commands, given if k > 0 else controller.get(commands))
+            for client in (controller, plant, guide):
+                client.step(k * step, step)
+        return np.array(plant.get(columns(shaken)[:2]))
 
-    first = command(0.1)
-    assert command(0.2) != first  # at a sample the command belongs to its inputs
-    held = command(0.1)
-    client.step(0.0, 0.4 * PERIOD)
-    assert command(0.2) == held
-    client.step(0.4 * PERIOD, 0.6 * PERIOD)
-    sampled = command(0.2)
-    assert sampled != held
-    client.step(PERIOD, 1.5 * PERIOD)  # a sample on the way takes the inputs that are held
-    assert command(0.7) == sampled
-    client.set(["control.mu.0"], [20.0])
-    assert command(0.7) == sampled
-    client.step(2.5 * PERIOD, 0.5 * PERIOD)
-    assert command(0.2) != sampled
+    description = open_fmu(build("controller", version)).description
+    proposed = float(description.defaultExperiment.stepSize)
+    on_time = own_run(shaken, values_of(shaken), True)[-1, :2]
+    for step in (proposed, 5e-4):  # the latter is what docs/fmu.md allows for this arm
+        np.testing.assert_allclose(late(step), on_time, rtol=0, atol=1e-3)
+    with pytest.raises(Exception, match="fmi"):
+        late(1e-3)  # what it forbids
 
 
 def test_simulate_fmu_with_another_parameter(build: Build, shaken: Program, values_of: Values) -> None:
@@ -377,40 +227,13 @@ def test_simulate_fmu_with_another_parameter(build: Build, shaken: Program, valu
     np.testing.assert_array_equal(np.column_stack([rows[name] for name in names]), expected)
 
 
-def test_a_tunable_parameter_counts_from_where_it_is_set(build: Build, open_fmu: Callable[[Path], Client]) -> None:
-    tuned, fresh = (open_fmu(build("loop", 3)) for _ in range(2))
-    tuned.start()
-    before = tuned.get(["U_lift"])
-    tuned.set(["control.mu.0"], [20.0])
-    fresh.set(["control.mu.0"], [20.0])
-    fresh.start()
-    assert tuned.get(["U_lift"]) == fresh.get(["U_lift"]) != before
-    np.testing.assert_array_equal(driven(tuned, ["q1_lift"]), driven(fresh, ["q1_lift"]))
-
-
-def test_start_time_and_uneven_communication_steps(
-    build: Build, open_fmu: Callable[[Path], Client], shaken: Program, values_of: Values
-) -> None:
-    names, start = columns(shaken), 0.25
-    client = open_fmu(build("loop", 2, CONTINUOUS)).start(start)
-    expected = own_run(shaken, values_of(shaken), False, start=start)
-    np.testing.assert_array_equal(driven(client, names, start), expected)
-
-    uneven = open_fmu(build("loop", 2, CONTINUOUS)).start(start)
-    times = start + DURATION * np.array([0.0, 0.1001, 0.33333, 0.5, 0.50001, 1.0])
-    for time, after in itertools.pairwise(times):
-        uneven.step(time, after - time)
-    np.testing.assert_allclose(uneven.get(names[:8]), expected[-1, :8], rtol=0, atol=1e-7)  # RK4 at other steps
-    assert uneven.get(["time"]) == [times[-1]]
-
-
-def test_table_signals(open_fmu: Callable[[Path], Client], values_of: Values, tmp_path: Path) -> None:
+def test_table_signals(open_fmu: Open, values_of: Values, tmp_path: Path) -> None:
     moved = program(Structure(base_motion=SignalShape("table", (1, 0, 1))))
     random = np.random.default_rng(474)
     table = Table(-0.05, 0.0625, True, random.normal(0.0, 0.1, (4, 2, 4)))
     values = values_of(moved)
     path = tmp_path / "table.fmu"
-    ending = replace(SAMPLED, since=0.0, until=DURATION)
+    ending = replace(SAMPLED, until=DURATION)
     content = fmu(
         moved.system.structure, values, ending, part="loop", version=3, identifier="table", name="table", tables=[table]
     )
@@ -419,14 +242,12 @@ def test_table_signals(open_fmu: Callable[[Path], Client], values_of: Values, tm
     client = open_fmu(path).start()
     np.testing.assert_array_equal(driven(client, names), own_run(moved, values, True, tables=[table]))
     refused(client, lambda: client.step(DURATION), "the scenario's tables end at 0.29999999999999999 s")
-    early = open_fmu(path)
-    refused(early, lambda: early.start(-0.1), "the scenario's tables begin at 0 s")
 
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_in_the_container_of_another_tool(
     build: Build,
-    open_fmu: Callable[[Path], Client],
+    open_fmu: Open,
     shaken: Program,
     values_of: Values,
     tmp_path: Path,
@@ -449,7 +270,7 @@ def test_in_the_container_of_another_tool(
 @pytest.mark.parametrize("version", [2, 3])
 def test_built_from_its_own_sources(
     build: Build,
-    open_fmu: Callable[[Path], Client],
+    open_fmu: Open,
     shaken: Program,
     values_of: Values,
     tmp_path: Path,
@@ -477,43 +298,7 @@ def test_built_from_its_own_sources(
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_state_is_saved_restored_and_serialised(build: Build, open_fmu: Callable[[Path], Client], version: int) -> None:
-    path = build("loop", version, CONTINUOUS if version == 2 else SAMPLED)
-    client = open_fmu(path).start()
-    outputs = client.names("output")
-    client.step(0.0, 7 * STEP)  # between two samples
-    state = client.slave.getFMUState()
-    data = client.slave.serializeFMUState(state)
-
-    def onwards(of: Client) -> list[list[float]]:
-        rows = []
-        for k in range(5):
-            of.step((7 + 9 * k) * STEP, 9 * STEP)
-            rows.append(of.get(outputs))
-        return rows
-
-    first = onwards(client)
-    client.set(["control.delta"], [0.5])
-    client.slave.setFMUState(state)
-    assert client.get(["control.delta"]) == [0.05]
-    assert onwards(client) == first
-    other = open_fmu(path)  # another instance, never initialised
-    foreign = other.slave.deserializeFMUState(data)
-    other.slave.setFMUState(foreign)
-    assert other.get(["time"]) == [7 * STEP]
-    assert onwards(other) == first
-    assert other.slave.serializeFMUState(foreign) == data
-    spoilt = bytearray(data)
-    spoilt[100] ^= 1
-    for bad in (bytes(spoilt), data[:-1], b""):
-        with pytest.raises(Exception, match=r"[Dd]e[sS]erialize"):
-            other.slave.deserializeFMUState(bad)
-    for instance, kept in ((client, state), (other, foreign)):
-        instance.slave.freeFMUState(kept)
-
-
-@pytest.mark.parametrize("version", [2, 3])
-def test_instances_are_independent_and_reset(build: Build, open_fmu: Callable[[Path], Client], version: int) -> None:
+def test_instances_are_independent_and_reset(build: Build, open_fmu: Open, version: int) -> None:
     path = build("loop", version, CONTINUOUS if version == 2 else SAMPLED)
     alone = driven(open_fmu(path).start(), ["q1_lift", "U_lift"])
     one, other = open_fmu(path), open_fmu(path)
@@ -531,9 +316,7 @@ def test_instances_are_independent_and_reset(build: Build, open_fmu: Callable[[P
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_ten_thousand_instances_leave_nothing_behind(
-    build: Build, open_fmu: Callable[[Path], Client], version: int
-) -> None:
+def test_ten_thousand_instances_leave_nothing_behind(build: Build, open_fmu: Open, version: int) -> None:
     statm = Path("/proc/self/statm")
     if not statm.exists():
         pytest.skip("the resident set is read from /proc, which only Linux has")
@@ -578,19 +361,8 @@ def test_ten_thousand_instances_leave_nothing_behind(
 # --- what goes wrong -------------------------------------------------------------------------------------
 
 
-def refused(client: Client, action: Callable[[], object], text: str) -> None:
-    """The action is an FMI error, and its message says `text`."""
-    before = len(client.messages)
-    with pytest.raises(Exception, match="fmi"):
-        action()
-    assert len(client.messages) == before + 1, client.messages
-    assert text in client.messages[-1]
-
-
 @pytest.mark.parametrize("version", [2, 3])
-def test_wrong_values_are_refused_and_change_nothing(
-    build: Build, open_fmu: Callable[[Path], Client], version: int
-) -> None:
+def test_wrong_values_are_refused_and_change_nothing(build: Build, open_fmu: Open, version: int) -> None:
     client = open_fmu(build("controller", version)).start()
     inputs = client.names("input")
     client.set(inputs, [0.1] * len(inputs))
@@ -602,7 +374,7 @@ def test_wrong_values_are_refused_and_change_nothing(
         ("control.nu", 3.0, "expected a positive even integer"),
         ("control.mu.0", 0.0, "expected a number > 0"),
         ("control.k1", inf, "expected a number > 0"),
-        ("control.U_max.0", -inf, "expected a number > 0 (inf means no limit)"),
+        ("control.U_max.0", -inf, "expected a number > 0 (1e+300 or more means no limit)"),
         ("control.U_max.0", nan, "control.U_max.0 is"),
         ("q1_lift", nan, "q1_lift is"),
         ("q1d_rotation", inf, "q1d_rotation is inf, expected a finite number"),
@@ -620,7 +392,7 @@ def test_wrong_values_are_refused_and_change_nothing(
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_steps_that_cannot_be(build: Build, open_fmu: Callable[[Path], Client], version: int) -> None:
+def test_steps_that_cannot_be(build: Build, open_fmu: Open, version: int) -> None:
     client = open_fmu(build("plant", version))
     refused(client, lambda: client.step(0.0), "may not be called before initialization")
     client.start(stop=1.0)
@@ -643,7 +415,7 @@ def test_steps_that_cannot_be(build: Build, open_fmu: Callable[[Path], Client], 
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_null_pointers_and_foreign_tokens(build: Build, open_fmu: Callable[[Path], Client], version: int) -> None:
+def test_null_pointers_and_foreign_tokens(build: Build, open_fmu: Open, version: int) -> None:
     """Called as C may call it: with nothing where something is expected. Errors, never a crash."""
     client = open_fmu(build("plant", version))
     dll = client.slave.dll

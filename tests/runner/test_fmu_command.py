@@ -76,7 +76,7 @@ def test_scenario_file_name_and_tunable(tmp_path: Path, monkeypatch: pytest.Monk
         text = archive.read("modelDescription.xml").decode()
     shown = re.findall(r'name="([^"]*)" valueReference="\d+" description="[^"]*" causality="parameter"', text)
     assert shown == ["control.mu.0", "control.mu.1", "control.delta"]
-    assert '<DefaultExperiment startTime="0.0" stopTime="3.0" stepSize="0.002" />' in text
+    assert '<DefaultExperiment startTime="0.0" stopTime="3.0" stepSize="0.0001" />' in text
 
 
 def test_wrong_input(tmp_path: Path, folder: Path) -> None:

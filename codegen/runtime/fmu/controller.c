@@ -4,12 +4,12 @@
  * The command belongs to the inputs of the same time. With a sample period it does so at the samples and is held in
  * between; importers that step from sample to sample see no difference.
  */
-static int fmu_begin(fmu_instance *fmu) {
+static int fmu_begin(fmu_core *fmu) {
   (void)fmu;
   return SPRINGLINE_OK;
 }
 
-static int fmu_sample(fmu_instance *fmu) {
+static int fmu_sample(fmu_core *fmu) {
   double *v = fmu->now.values;
   springline_reference reference;
   springline_measurement measurement;
@@ -25,20 +25,13 @@ static int fmu_sample(fmu_instance *fmu) {
   return SPRINGLINE_OK;
 }
 
-static int fmu_evaluate(fmu_instance *fmu) { return fmu->now.between ? SPRINGLINE_OK : fmu_sample(fmu); }
+static int fmu_evaluate(fmu_core *fmu) { return fmu->now.between ? SPRINGLINE_OK : fmu_sample(fmu); }
 
-static int fmu_advance(fmu_instance *fmu, double until) {
-  fmu_state *now = &fmu->now;
+static int fmu_advance(fmu_core *fmu, const fmu_place *to) {
+  /* Samples before the end of the step see the inputs that are held; the one at its end is fmu_evaluate's. */
+  const int64_t on_the_way = to->step - fmu->now.step - (to->between ? 0 : 1);
   int status = fmu_evaluate(fmu); /* the command of a sample that was never asked for is held too */
-  if (FMU_GRID > 0.0) {
-    const int64_t before = now->step;
-    const double tolerance = fmu_tolerance(until);
-    int64_t on_the_way;
-    while (fmu_grid_time(now, 2 * (now->step + 1)) <= until + tolerance) now->step++;
-    now->between = until - fmu_grid_time(now, 2 * now->step) > tolerance;
-    on_the_way = now->step - before - (now->between ? 0 : 1); /* samples before `until` see the inputs that are held */
-    if (status == SPRINGLINE_OK && on_the_way > 0) status = fmu_sample(fmu);
-  }
-  if (status == SPRINGLINE_OK) now->time = until;
+  if (status == SPRINGLINE_OK && on_the_way > 0) status = fmu_sample(fmu);
+  if (status == SPRINGLINE_OK) fmu_arrive(&fmu->now, to);
   return status;
 }

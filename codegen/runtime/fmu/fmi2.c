@@ -54,7 +54,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   fmu_instance *fmu;
   (void)fmuResourceLocation, (void)visible, (void)loggingOn;
   if (functions == NULL) return NULL;
-  fmu = fmu_new(instanceName, fmuGUID, functions->logger, functions->componentEnvironment);
+  fmu = fmu_new("fmi2Instantiate", instanceName, fmuGUID, functions->logger, functions->componentEnvironment);
   if (fmu != NULL && fmuType != fmi2CoSimulation) {
     (void)fmu_unsupported(fmu, "fmi2Instantiate for Model Exchange");
     free(fmu);
@@ -75,7 +75,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
   fmu_instance *fmu = c;
   if (!fmu_allowed(fmu, "fmi2EnterInitializationMode", FMU_INSTANTIATED)) return fmi2Error;
-  fmu->now.mode = FMU_INITIALIZING;
+  fmu->core.now.mode = FMU_INITIALIZING;
   return fmi2OK;
 }
 
@@ -88,14 +88,13 @@ fmi2Status fmi2Terminate(fmi2Component c) {
   fmu_instance *fmu = c;
   if (!fmu_allowed(fmu, "fmi2Terminate", FMU_STEPPING)) return fmi2Error;
   if (fmu_refresh(fmu, "fmi2Terminate") != FMU_OK) return fmi2Error;
-  fmu->now.mode = FMU_TERMINATED;
+  fmu->core.now.mode = FMU_TERMINATED;
   return fmi2OK;
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
   if (!fmu_allowed(c, "fmi2Reset", FMU_ANY)) return fmi2Error;
-  fmu_reset(c);
-  return fmi2OK;
+  return result_of(fmu_reset(c, "fmi2Reset"));
 }
 
 /* ---- values ------------------------------------------------------------------------------------------------ */
@@ -123,13 +122,9 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
-  size_t i;
   if (!fmu_allowed(c, "fmi2SetReal", FMU_SETTABLE)) return fmi2Error;
   if (!fmu_given(c, "fmi2SetReal", vr, nvr) || !fmu_given(c, "fmi2SetReal", value, nvr)) return fmi2Error;
-  for (i = 0; i < nvr; i++) {
-    if (fmu_set(c, "fmi2SetReal", vr[i], value[i]) != FMU_OK) return fmi2Error;
-  }
-  return fmi2OK;
+  return result_of(fmu_set(c, "fmi2SetReal", vr, nvr, value));
 }
 
 /* There is no variable of these types, and no Boolean that could be set; asking for none of them is no mistake. */
@@ -174,8 +169,7 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
   if (!fmu_allowed(c, "fmi2SetFMUstate", FMU_ANY)) return fmi2Error;
   if (!fmu_given(c, "fmi2SetFMUstate", FMUstate, 1)) return fmi2Error;
-  fmu_restore(c, FMUstate);
-  return fmi2OK;
+  return result_of(fmu_restore(c, "fmi2SetFMUstate", FMUstate));
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
@@ -190,7 +184,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
   if (!fmu_allowed(c, "fmi2SerializedFMUstateSize", FMU_ANY)) return fmi2Error;
   if (!fmu_given(c, "fmi2SerializedFMUstateSize", FMUstate, 1)) return fmi2Error;
   if (!fmu_given(c, "fmi2SerializedFMUstateSize", size, 1)) return fmi2Error;
-  *size = sizeof(fmu_serialized);
+  *size = sizeof(fmu_saved);
   return fmi2OK;
 }
 
@@ -244,7 +238,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
   if (!fmu_allowed(c, "fmi2GetRealStatus", FMU_ANY)) return fmi2Error;
   if (!fmu_given(c, "fmi2GetRealStatus", value, 1)) return fmi2Error;
   if (s != fmi2LastSuccessfulTime) return fmi2Discard;
-  *value = fmu->now.time;
+  *value = fmu->core.now.clock;
   return fmi2OK;
 }
 

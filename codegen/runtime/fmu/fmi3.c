@@ -46,7 +46,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          size_t nRequiredIntermediateVariables,
                                          fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate) {
-  fmu_instance *fmu = fmu_new(instanceName, instantiationToken, logMessage, instanceEnvironment);
+  fmu_instance *fmu = fmu_new("fmi3InstantiateCoSimulation", instanceName, instantiationToken, logMessage, instanceEnvironment);
   (void)resourcePath, (void)visible, (void)loggingOn, (void)earlyReturnAllowed, (void)intermediateUpdate;
   (void)requiredIntermediateVariables;
   if (fmu != NULL && (eventModeUsed || nRequiredIntermediateVariables > 0)) {
@@ -60,7 +60,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
 /* An instance that lives just long enough to say that there is none of its kind. */
 static fmi3Instance no_instance(const char *function, fmi3String name, fmi3String token, fmi3LogMessageCallback logger,
                                 fmi3InstanceEnvironment environment) {
-  fmu_instance *fmu = fmu_new(name, token, logger, environment);
+  fmu_instance *fmu = fmu_new(function, name, token, logger, environment);
   if (fmu != NULL) (void)fmu_unsupported(fmu, function);
   free(fmu);
   return NULL;
@@ -95,7 +95,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
   if (fmu_set_experiment(fmu, "fmi3EnterInitializationMode", startTime, stopTimeDefined, stopTime) != FMU_OK) {
     return fmi3Error;
   }
-  fmu->now.mode = FMU_INITIALIZING;
+  fmu->core.now.mode = FMU_INITIALIZING;
   return fmi3OK;
 }
 
@@ -108,14 +108,13 @@ fmi3Status fmi3Terminate(fmi3Instance instance) {
   fmu_instance *fmu = instance;
   if (!fmu_allowed(fmu, "fmi3Terminate", FMU_STEPPING)) return fmi3Error;
   if (fmu_refresh(fmu, "fmi3Terminate") != FMU_OK) return fmi3Error;
-  fmu->now.mode = FMU_TERMINATED;
+  fmu->core.now.mode = FMU_TERMINATED;
   return fmi3OK;
 }
 
 fmi3Status fmi3Reset(fmi3Instance instance) {
   if (!fmu_allowed(instance, "fmi3Reset", FMU_ANY)) return fmi3Error;
-  fmu_reset(instance);
-  return fmi3OK;
+  return result_of(fmu_reset(instance, "fmi3Reset"));
 }
 
 /* ---- values ------------------------------------------------------------------------------------------------ */
@@ -155,13 +154,9 @@ fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference valueR
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Float64 values[], size_t nValues) {
-  size_t i;
   if (!fmu_allowed(instance, "fmi3SetFloat64", FMU_SETTABLE)) return fmi3Error;
   if (!listed(instance, "fmi3SetFloat64", valueReferences, nValueReferences, values, nValues)) return fmi3Error;
-  for (i = 0; i < nValueReferences; i++) {
-    if (fmu_set(instance, "fmi3SetFloat64", valueReferences[i], values[i]) != FMU_OK) return fmi3Error;
-  }
-  return fmi3OK;
+  return result_of(fmu_set(instance, "fmi3SetFloat64", valueReferences, nValueReferences, values));
 }
 
 /* There is no variable of the other types, and no Boolean that could be set; asking for none of them is no mistake. */
@@ -240,8 +235,7 @@ fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
 fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
   if (!fmu_allowed(instance, "fmi3SetFMUState", FMU_ANY)) return fmi3Error;
   if (!fmu_given(instance, "fmi3SetFMUState", FMUState, 1)) return fmi3Error;
-  fmu_restore(instance, FMUState);
-  return fmi3OK;
+  return result_of(fmu_restore(instance, "fmi3SetFMUState", FMUState));
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
@@ -256,7 +250,7 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUSta
   if (!fmu_allowed(instance, "fmi3SerializedFMUStateSize", FMU_ANY)) return fmi3Error;
   if (!fmu_given(instance, "fmi3SerializedFMUStateSize", FMUState, 1)) return fmi3Error;
   if (!fmu_given(instance, "fmi3SerializedFMUStateSize", size, 1)) return fmi3Error;
-  *size = sizeof(fmu_serialized);
+  *size = sizeof(fmu_saved);
   return fmi3OK;
 }
 
@@ -291,7 +285,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
   }
   result = fmu_do_step(fmu, "fmi3DoStep", currentCommunicationPoint, communicationStepSize);
   *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
-  *lastSuccessfulTime = fmu->now.time;
+  *lastSuccessfulTime = fmu->core.now.clock;
   return result_of(result);
 }
 

@@ -1,15 +1,11 @@
 /*
- * instance.h - an FMU instance, whatever the version of FMI: its values, its time, its modes and what they allow.
+ * instance.h - an FMU instance, whatever the version of FMI: its modes and what they allow, its values, steps and states.
  *
- * Included once, by fmi2.c or fmi3.c, which define fmu_logger and fmu_log; fmu_model.h says what variables there are.
- * One of controller.c, plant.c and loop.c says what they do: fmu_begin, fmu_evaluate, fmu_advance.
- * A value reference is an index into `values`. The state of an instance is one structure without pointers, which is
- * what is saved, restored and serialised.
+ * Included once, by fmi2.c or fmi3.c, which define fmu_logger and fmu_log; state.h and the part come before it.
  */
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { FMU_OK = 0, FMU_ERROR = 1, FMU_MESSAGE = 512 };
 
@@ -23,33 +19,15 @@ enum {
   FMU_ANY = 31
 };
 
-/* What an instance may be asked to restore: doubles first, then integers, so that no byte of it is padding. */
 typedef struct {
-  double values[FMU_VALUES];
-  double start, time, stop;
-  int64_t step;    /* grid points of step or sample period passed since `start` */
-  int32_t between; /* 1: time is between two grid points */
-  int32_t has_stop;
-  int32_t mode;
-  int32_t reserved;
-} fmu_state;
-
-typedef struct {
-  fmu_state now;
-  springline_controller controller;
-  int configured; /* controller holds the parameters of `now` */
-  int fresh;      /* outputs of `now` belong to its inputs and time */
+  fmu_core core;
+  int fresh; /* outputs belong to the inputs and the time that they stand beside */
   fmu_logger logger;
   void *environment;
   char name[]; /* of the instance */
 } fmu_instance;
 
 static void fmu_log(const fmu_instance *fmu, const char *message);
-
-/* What a part does; each returns a status of springline.h. */
-static int fmu_begin(fmu_instance *fmu);                  /* sets the initial state */
-static int fmu_evaluate(fmu_instance *fmu);               /* sets the outputs of this time */
-static int fmu_advance(fmu_instance *fmu, double until);  /* goes on to a later time */
 
 /* ---- messages ---------------------------------------------------------------------------------------------- */
 
@@ -65,15 +43,15 @@ static int fmu_refuse(const fmu_instance *fmu, const char *format, ...) {
 
 /* Nothing more can be computed until the instance is reset or restored. */
 static int fmu_fail(fmu_instance *fmu, const char *function, int status) {
-  fmu->now.mode = FMU_FAILED;
-  return fmu_refuse(fmu, "%s: at %.17g s: %s", function, fmu->now.time, springline_status_text(status));
+  fmu->core.now.mode = FMU_FAILED;
+  return fmu_refuse(fmu, "%s: at %.17g s: %s", function, fmu->core.now.clock, springline_status_text(status));
 }
 
 static int fmu_allowed(const fmu_instance *fmu, const char *function, int modes) {
   const char *mode;
   if (fmu == NULL) return 0;
-  if ((fmu->now.mode & modes) != 0) return 1;
-  switch (fmu->now.mode) {
+  if ((fmu->core.now.mode & modes) != 0) return 1;
+  switch (fmu->core.now.mode) {
     case FMU_INSTANTIATED: mode = "before initialization"; break;
     case FMU_INITIALIZING: mode = "in initialization mode"; break;
     case FMU_STEPPING: mode = "after initialization"; break;
@@ -95,28 +73,38 @@ static int fmu_given(const fmu_instance *fmu, const char *function, const void *
   return 0;
 }
 
-/* ---- time -------------------------------------------------------------------------------------------------- */
-
-/* Time of half grid step j, as in the simulation loop: never accumulated. */
-static double fmu_grid_time(const fmu_state *now, int64_t j) { return now->start + (0.5 * (double)j) * FMU_GRID; }
-
-/* How far a time may be off and still be meant: importers add steps up, we do not. */
-static double fmu_tolerance(double t) {
-  const double grid = 1e-3 * FMU_GRID, digits = 1e-12 * sl_fabs(t);
-  return FMU_GRID > 0.0 ? sl_fmax(grid, digits) : sl_fmax(1e-9, digits);
-}
-
 /* ---- life -------------------------------------------------------------------------------------------------- */
 
-static void fmu_reset(fmu_instance *fmu) {
-  int i;
-  memset(&fmu->now, 0, sizeof fmu->now);
-  for (i = 0; i < FMU_VALUES; i++) fmu->now.values[i] = fmu_variables[i].start;
-  fmu->now.mode = FMU_INSTANTIATED;
-  fmu->configured = fmu->fresh = 0;
+static springline_config fmu_config(const double *values) {
+  springline_config config = springline_default_config;
+  fmu_get_parameters(values + FMU_AT_PARAMETERS, &config);
+  return config;
 }
 
-static fmu_instance *fmu_new(const char *name, const char *token, fmu_logger logger, void *environment) {
+/* Takes a state whole, with a controller of its own, or leaves everything as it was. */
+static int fmu_take(fmu_instance *fmu, const char *function, const fmu_state *state) {
+  const springline_config config = fmu_config(state->values);
+  fmu_core core;
+  int status;
+  core.now = *state;
+  status = springline_init(&core.controller, &config);
+  if (status != SPRINGLINE_OK) return fmu_refuse(fmu, "%s: %s", function, springline_status_text(status));
+  fmu->core = core;
+  fmu->fresh = 0;
+  return FMU_OK;
+}
+
+static int fmu_reset(fmu_instance *fmu, const char *function) {
+  fmu_state state;
+  int i;
+  memset(&state, 0, sizeof state);
+  for (i = 0; i < FMU_VALUES; i++) state.values[i] = fmu_variables[i].start;
+  state.mode = FMU_INSTANTIATED;
+  return fmu_take(fmu, function, &state);
+}
+
+static fmu_instance *fmu_new(const char *function, const char *name, const char *token, fmu_logger logger,
+                             void *environment) {
   const size_t length = name != NULL ? strlen(name) : 0;
   fmu_instance *fmu = calloc(1, sizeof *fmu + length + 1);
   if (fmu == NULL) return NULL;
@@ -124,55 +112,46 @@ static fmu_instance *fmu_new(const char *name, const char *token, fmu_logger log
   fmu->logger = logger;
   fmu->environment = environment;
   if (length == 0) {
-    (void)fmu_refuse(fmu, "the instance has no name");
+    (void)fmu_refuse(fmu, "%s: the instance has no name", function);
   } else if (token == NULL || strcmp(token, FMU_TOKEN) != 0) {
-    (void)fmu_refuse(fmu, "the token is %s, expected %s: binary and modelDescription.xml are of different FMUs",
-                     token != NULL ? token : "NULL", FMU_TOKEN);
-  } else {
-    fmu_reset(fmu);
+    (void)fmu_refuse(fmu, "%s: the token is %s, expected %s: binary and modelDescription.xml are of different FMUs",
+                     function, token != NULL ? token : "NULL", FMU_TOKEN);
+  } else if (fmu_reset(fmu, function) == FMU_OK) {
     return fmu;
   }
   free(fmu);
   return NULL;
 }
 
-static int fmu_configure(fmu_instance *fmu) {
-  springline_config config = springline_default_config;
-  int status;
-  if (fmu->configured) return SPRINGLINE_OK;
-  fmu_get_parameters(fmu->now.values + FMU_AT_PARAMETERS, &config);
-  status = springline_init(&fmu->controller, &config);
-  fmu->configured = status == SPRINGLINE_OK;
-  return status;
-}
-
 static int fmu_refresh(fmu_instance *fmu, const char *function) {
-  int status;
-  if (fmu->fresh || (fmu->now.mode & (FMU_INITIALIZING | FMU_STEPPING)) == 0) return FMU_OK;
-  status = fmu_configure(fmu);
-  if (status == SPRINGLINE_OK && fmu->now.mode == FMU_INITIALIZING) status = fmu_begin(fmu);
-  if (status == SPRINGLINE_OK) status = fmu_evaluate(fmu);
+  const int64_t mode = fmu->core.now.mode;
+  int status = SPRINGLINE_OK;
+  if (fmu->fresh || (mode & (FMU_INITIALIZING | FMU_STEPPING)) == 0) return FMU_OK;
+  if (mode == FMU_INITIALIZING) status = fmu_begin(&fmu->core);
+  if (status == SPRINGLINE_OK) status = fmu_evaluate(&fmu->core);
   if (status != SPRINGLINE_OK) return fmu_fail(fmu, function, status);
   fmu->fresh = 1;
   return FMU_OK;
 }
 
 static int fmu_set_experiment(fmu_instance *fmu, const char *function, double start, int has_stop, double stop) {
+  fmu_state *now = &fmu->core.now;
   if (!sl_isfinite(start) || (has_stop && !(sl_isfinite(stop) && stop >= start))) {
     return fmu_refuse(fmu, "%s: start time %g s and stop time %g s are no interval", function, start, stop);
   }
-  if (start < FMU_SINCE - fmu_tolerance(start)) {
-    return fmu_refuse(fmu, "%s: start time %g s, but the scenario's tables begin at %g s", function, start, FMU_SINCE);
+  if (!fmu_resolves(start)) {
+    return fmu_refuse(fmu, "%s: at the start time %.17g s numbers are %g s apart, more than a hundredth of a step of "
+                      "%g s: start nearer to 0", function, start, fmu_spacing(start), FMU_GRID);
   }
-  fmu->now.start = fmu->now.time = fmu->now.values[0] = start;
-  fmu->now.stop = has_stop ? stop : 0.0;
-  fmu->now.has_stop = has_stop;
+  now->start = now->clock = now->values[0] = start;
+  now->stop = has_stop ? stop : 0.0;
+  now->has_stop = has_stop ? 1 : 0;
   return FMU_OK;
 }
 
 static int fmu_exit_initialization(fmu_instance *fmu, const char *function) {
   const int result = fmu_refresh(fmu, function);
-  if (result == FMU_OK) fmu->now.mode = FMU_STEPPING;
+  if (result == FMU_OK) fmu->core.now.mode = FMU_STEPPING;
   return result;
 }
 
@@ -193,7 +172,7 @@ static int fmu_known(const fmu_instance *fmu, const char *function, unsigned ref
 static int fmu_get(fmu_instance *fmu, const char *function, unsigned reference, int boolean, double *value) {
   if (!fmu_known(fmu, function, reference, boolean)) return FMU_ERROR;
   if (fmu_variables[reference].causality == FMU_OUTPUT && fmu_refresh(fmu, function) != FMU_OK) return FMU_ERROR;
-  *value = fmu->now.values[reference];
+  *value = fmu->core.now.values[reference];
   return FMU_OK;
 }
 
@@ -204,62 +183,94 @@ static int fmu_admissible(const fmu_variable *variable, double value) {
   return !variable->even || sl_floor(0.5 * value) == 0.5 * value;
 }
 
-/* A value that may not be set is refused and changes nothing. */
-static int fmu_set(fmu_instance *fmu, const char *function, unsigned reference, double value) {
+/* Whether a variable may be set, now and to this value. */
+static int fmu_settable(const fmu_instance *fmu, const char *function, unsigned reference, double value) {
   const fmu_variable *variable;
-  if (!fmu_known(fmu, function, reference, 0)) return FMU_ERROR;
+  if (!fmu_known(fmu, function, reference, 0)) return 0;
   variable = &fmu_variables[reference];
   if (variable->causality != FMU_PARAMETER && variable->causality != FMU_INPUT) {
-    return fmu_refuse(fmu, "%s: %s is neither a parameter nor an input", function, variable->name);
+    (void)fmu_refuse(fmu, "%s: %s is neither a parameter nor an input", function, variable->name);
+    return 0;
   }
-  if (variable->fixed && fmu->now.mode == FMU_STEPPING) {
-    return fmu_refuse(fmu, "%s: %s is fixed after initialization", function, variable->name);
+  if (variable->fixed && fmu->core.now.mode == FMU_STEPPING) {
+    (void)fmu_refuse(fmu, "%s: %s is fixed after initialization", function, variable->name);
+    return 0;
   }
   if (!fmu_admissible(variable, value)) {
-    return fmu_refuse(fmu, "%s: %s is %g, expected %s", function, variable->name, value, variable->expected);
+    (void)fmu_refuse(fmu, "%s: %s is %g, expected %s", function, variable->name, value, variable->expected);
+    return 0;
   }
-  fmu->now.values[reference] = value;
+  return 1;
+}
+
+/* Sets all of the variables, or refuses one of them and sets none. */
+static int fmu_set(fmu_instance *fmu, const char *function, const unsigned references[], size_t n,
+                   const double values[]) {
+  double next[FMU_VALUES];
+  int parameters = 0;
+  size_t i;
+  memcpy(next, fmu->core.now.values, sizeof next);
+  for (i = 0; i < n; i++) {
+    if (!fmu_settable(fmu, function, references[i], values[i])) return FMU_ERROR;
+    next[references[i]] = fmu_variables[references[i]].infinite ? sl_fmin(values[i], FMU_NO_LIMIT) : values[i];
+    parameters |= fmu_variables[references[i]].causality == FMU_PARAMETER;
+  }
+  if (parameters) {
+    const springline_config config = fmu_config(next);
+    const int status = springline_set_parameters(&fmu->core.controller, &config);
+    if (status != SPRINGLINE_OK) return fmu_refuse(fmu, "%s: %s", function, springline_status_text(status));
+  }
+  memcpy(fmu->core.now.values, next, sizeof next);
   fmu->fresh = 0;
-  if (variable->causality == FMU_PARAMETER) fmu->configured = 0;
   return FMU_OK;
 }
 
 /* ---- steps ------------------------------------------------------------------------------------------------- */
 
+enum { FMU_MOST_STEPS = 1000000000 }; /* in one communication step: minutes to hours of computing */
+
 static int fmu_do_step(fmu_instance *fmu, const char *function, double from, double length) {
-  fmu_state *now = &fmu->now;
-  const double until = from + length;
+  fmu_state *now = &fmu->core.now;
+  const double until = from + length, unit = fmu_unit(length);
+  fmu_place place;
   int status;
-  if (!sl_isfinite(from) || !sl_isfinite(until) || !(length > 0.0)) {
-    return fmu_refuse(fmu, "%s: a step of %g s from %g s is impossible", function, length, from);
+  if (!sl_isfinite(from) || !sl_isfinite(until) || !(until > from)) {
+    return fmu_refuse(fmu, "%s: a step of %g s from %.17g s is impossible", function, length, from);
   }
-  if (sl_fabs(from - now->time) > fmu_tolerance(from)) {
-    return fmu_refuse(fmu, "%s: a step from %.17g s, but the instance is at %.17g s", function, from, now->time);
-  }
-  if (now->has_stop && until > now->stop + fmu_tolerance(until)) {
+  if (now->has_stop && until > now->stop + fmu_drift(now, now->stop, unit)) {
     return fmu_refuse(fmu, "%s: a step to %.17g s, but the experiment stops at %.17g s", function, until, now->stop);
   }
-  if (until > FMU_UNTIL + fmu_tolerance(until)) {
-    return fmu_refuse(fmu, "%s: a step to %.17g s, but the scenario's tables end at %.17g s", function, until,
-                      FMU_UNTIL);
+  if (!fmu_resolves(until)) {
+    return fmu_refuse(fmu, "%s: at %.17g s numbers are %g s apart, more than a hundredth of a step of %g s",
+                      function, until, fmu_spacing(until), FMU_GRID);
   }
-  if (FMU_GRID > 0.0 && length / FMU_GRID > 1e9) {
-    return fmu_refuse(fmu, "%s: a step of %g s is more than 1e9 steps of %g s", function, length, FMU_GRID);
+  if (sl_fabs(from - now->clock) > fmu_tolerance(from, unit)) {
+    return fmu_refuse(fmu, "%s: a step from %.17g s, but the instance is at %.17g s", function, from, now->clock);
   }
-  status = fmu_configure(fmu);
-  if (status == SPRINGLINE_OK) status = fmu_advance(fmu, until);
+  place = fmu_destination(now, length, until);
+  if (place.step - now->step > FMU_MOST_STEPS) {
+    return fmu_refuse(fmu, "%s: a step of %g s is more than %d steps of %g s", function, length, (int)FMU_MOST_STEPS,
+                      FMU_GRID);
+  }
+  if (place.time > FMU_UNTIL + fmu_tolerance(until, unit)) {
+    return fmu_refuse(fmu, "%s: a step to %.17g s after the start, but the scenario's tables end at %.17g s", function,
+                      place.time, FMU_UNTIL);
+  }
+  status = fmu_advance(&fmu->core, &place);
   fmu->fresh = 0;
-  now->values[0] = now->time;
+  now->calls++;
+  now->clock = now->values[0] = status == SPRINGLINE_OK ? until : now->start + now->time;
   return status == SPRINGLINE_OK ? FMU_OK : fmu_fail(fmu, function, status);
 }
 
 /* ---- saved states ------------------------------------------------------------------------------------------ */
 
+/* A state outside of its instance, kept by the importer or turned into bytes. */
 typedef struct {
   char token[48];
   uint64_t checksum;
   fmu_state state;
-} fmu_serialized;
+} fmu_saved;
 
 static uint64_t fmu_checksum(const fmu_state *state) { /* FNV-1a */
   const unsigned char *bytes = (const unsigned char *)state;
@@ -269,48 +280,94 @@ static uint64_t fmu_checksum(const fmu_state *state) { /* FNV-1a */
   return hash;
 }
 
-/* Into *saved, allocated if it is NULL. */
-static int fmu_save(fmu_instance *fmu, const char *function, void **saved) {
-  fmu_state *copy;
+/* The first thing in a state that no instance can have come to; NULL if there is none. */
+static const char *fmu_impossible(const fmu_state *state) {
+  const double unit = fmu_unit(state->time);
+  const int64_t most = INT64_C(1) << 53;
+  int i;
+  switch (state->mode) {
+    case FMU_INSTANTIATED: case FMU_INITIALIZING: case FMU_STEPPING: case FMU_TERMINATED: case FMU_FAILED: break;
+    default: return "its mode";
+  }
+  if (!sl_isfinite(state->start) || !fmu_resolves(state->start)) return "its start time";
+  if (state->has_stop != 0 && state->has_stop != 1) return "its mark of a stop time";
+  if (state->has_stop && !(sl_isfinite(state->stop) && state->stop >= state->start)) return "its stop time";
+  if (!sl_isfinite(state->time) || state->time < 0.0) return "its time";
+  if (state->calls < 0 || state->calls > most) return "its count of communication steps";
+  if (state->step < 0 || state->step > most) return "its count of steps";
+  if (state->between != 0 && state->between != 1) return "its mark of a time between steps";
+  if (FMU_GRID > 0.0) {
+    const double last = fmu_grid_time(2 * state->step), next = fmu_grid_time(2 * state->step + 2);
+    if (state->between ? !(last < state->time && state->time < next) : state->time != last) return "its place in a step";
+  } else if (state->step != 0 || state->between != 0) {
+    return "its place in a step";
+  }
+  if (state->mode <= FMU_INITIALIZING && (state->time != 0.0 || state->calls != 0)) return "a time before the start";
+  if (!sl_isfinite(state->clock) || sl_fabs(state->clock - state->start - state->time) >
+                                        fmu_drift(state, state->clock, unit) + fmu_tolerance(state->clock, unit)) {
+    return "its communication point";
+  }
+  if (state->values[0] != state->clock) return fmu_variables[0].name;
+  for (i = 1; i < FMU_VALUES; i++) {
+    if (!fmu_admissible(&fmu_variables[i], state->values[i])) return fmu_variables[i].name;
+    if (fmu_variables[i].boolean && state->values[i] != 0.0 && state->values[i] != 1.0) return fmu_variables[i].name;
+  }
+  return NULL;
+}
+
+static int fmu_possible(const fmu_instance *fmu, const char *function, const fmu_saved *saved) {
+  const char *field;
+  if (memcmp(saved->token, FMU_TOKEN, sizeof FMU_TOKEN) != 0 || saved->checksum != fmu_checksum(&saved->state)) {
+    (void)fmu_refuse(fmu, "%s: this is no state of this FMU", function);
+    return 0;
+  }
+  field = fmu_impossible(&saved->state);
+  if (field == NULL) return 1;
+  (void)fmu_refuse(fmu, "%s: this is no state that can be: %s is wrong", function, field);
+  return 0;
+}
+
+/* Into *state, allocated if it is NULL. */
+static int fmu_save(fmu_instance *fmu, const char *function, void **state) {
+  fmu_saved *saved;
   if (fmu_refresh(fmu, function) != FMU_OK) return FMU_ERROR;
-  copy = *saved != NULL ? *saved : malloc(sizeof *copy);
-  if (copy == NULL) return fmu_refuse(fmu, "%s: no memory", function);
-  *copy = fmu->now;
-  *saved = copy;
+  saved = *state != NULL ? *state : malloc(sizeof *saved);
+  if (saved == NULL) return fmu_refuse(fmu, "%s: no memory", function);
+  memset(saved, 0, sizeof *saved);
+  memcpy(saved->token, FMU_TOKEN, sizeof FMU_TOKEN);
+  saved->state = fmu->core.now;
+  saved->checksum = fmu_checksum(&saved->state);
+  *state = saved;
   return FMU_OK;
 }
 
-static void fmu_restore(fmu_instance *fmu, const void *saved) {
-  memcpy(&fmu->now, saved, sizeof fmu->now);
-  fmu->configured = fmu->fresh = 0;
+static int fmu_restore(fmu_instance *fmu, const char *function, const fmu_saved *saved) {
+  return fmu_possible(fmu, function, saved) ? fmu_take(fmu, function, &saved->state) : FMU_ERROR;
 }
 
-static int fmu_serialize(const fmu_instance *fmu, const char *function, const void *saved, void *bytes, size_t size) {
-  fmu_serialized form;
-  if (size < sizeof form) {
+static int fmu_serialize(const fmu_instance *fmu, const char *function, const fmu_saved *saved, void *bytes,
+                         size_t size) {
+  if (size < sizeof *saved) {
     return fmu_refuse(fmu, "%s: %lu bytes do not hold a state of %lu", function, (unsigned long)size,
-                      (unsigned long)sizeof form);
+                      (unsigned long)sizeof *saved);
   }
-  memset(&form, 0, sizeof form);
-  memcpy(form.token, FMU_TOKEN, sizeof FMU_TOKEN);
-  memcpy(&form.state, saved, sizeof form.state);
-  form.checksum = fmu_checksum(&form.state);
-  memcpy(bytes, &form, sizeof form);
+  if (!fmu_possible(fmu, function, saved)) return FMU_ERROR;
+  memcpy(bytes, saved, sizeof *saved);
   return FMU_OK;
 }
 
 static int fmu_deserialize(const fmu_instance *fmu, const char *function, const void *bytes, size_t size,
-                           void **saved) {
-  fmu_serialized form;
-  fmu_state *copy;
-  if (size < sizeof form) return fmu_refuse(fmu, "%s: these bytes are too few for a state", function);
-  memcpy(&form, bytes, sizeof form);
-  if (memcmp(form.token, FMU_TOKEN, sizeof FMU_TOKEN) != 0 || form.checksum != fmu_checksum(&form.state)) {
-    return fmu_refuse(fmu, "%s: these bytes are no state of this FMU", function);
+                           void **state) {
+  fmu_saved saved, *copy;
+  if (size != sizeof saved) {
+    return fmu_refuse(fmu, "%s: %lu bytes, a state has %lu", function, (unsigned long)size,
+                      (unsigned long)sizeof saved);
   }
+  memcpy(&saved, bytes, sizeof saved);
+  if (!fmu_possible(fmu, function, &saved)) return FMU_ERROR;
   copy = malloc(sizeof *copy);
   if (copy == NULL) return fmu_refuse(fmu, "%s: no memory", function);
-  *copy = form.state;
-  *saved = copy;
+  *copy = saved;
+  *state = copy;
   return FMU_OK;
 }

@@ -3,18 +3,16 @@
  *
  * FMU_HOLD > 0: the command is sampled every FMU_HOLD steps and held; 0: the law is part of the differential equation.
  */
-#include "stepping.h"
-
 enum { FMU_CURRENT = 2 * FMU_JOINTS }; /* the diagnostics e and sigma come first, and are never held */
 
-static int fmu_control(fmu_instance *fmu, const springline_reference *reference, const double *x,
+static int fmu_control(fmu_core *fmu, const springline_reference *reference, const double *x,
                        springline_command *command, springline_diagnostics *diagnostics) {
   springline_measurement measurement;
   fmu_measure(x, &measurement);
   return springline_step(&fmu->controller, reference, &measurement, command, diagnostics);
 }
 
-static int fmu_evaluate(fmu_instance *fmu) {
+static int fmu_evaluate(fmu_core *fmu) {
   double *v = fmu->now.values, seen[FMU_DIAGNOSTICS];
 #if FMU_HOLD > 0
   const int sampling = !fmu->now.between && fmu->now.step % FMU_HOLD == 0;
@@ -40,7 +38,7 @@ static int fmu_evaluate(fmu_instance *fmu) {
 
 #if FMU_HOLD > 0
 
-static int fmu_move(fmu_instance *fmu, const fmu_interval *interval, double *x) {
+static int fmu_move(fmu_core *fmu, const fmu_interval *interval, double *x) {
   springline_reference reference;
   springline_base base[3];
   springline_command command;
@@ -60,7 +58,7 @@ static int fmu_move(fmu_instance *fmu, const fmu_interval *interval, double *x) 
 #else
 
 /* One classical Runge-Kutta step, operation by operation that of the simulation loop. */
-static int fmu_move(fmu_instance *fmu, const fmu_interval *interval, double *x) {
+static int fmu_move(fmu_core *fmu, const fmu_interval *interval, double *x) {
   static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
   static const int when[4] = {0, 1, 1, 2};
   const double h = interval->length;

@@ -1,7 +1,6 @@
 /* plant.c - the arm as a part of an FMU: its state under commands that are held over each communication step. */
-#include "stepping.h"
 
-static int fmu_evaluate(fmu_instance *fmu) {
+static int fmu_evaluate(fmu_core *fmu) {
 #if FMU_BASE_IS_INPUT
   (void)fmu; /* the state is the output */
   return SPRINGLINE_OK;
@@ -14,7 +13,7 @@ static int fmu_evaluate(fmu_instance *fmu) {
 #endif
 }
 
-static int fmu_move(fmu_instance *fmu, const fmu_interval *interval, double *x) {
+static int fmu_move(fmu_core *fmu, const fmu_interval *interval, double *x) {
   springline_reference reference;
   springline_base base[3];
   springline_command command;
