@@ -17,7 +17,8 @@ def generate_files(export: Export) -> tuple[dict[str, bytes], dict[str, Any]]:
     """The files of an export by relative path, and its manifest (to which codegen.manifest adds the list of files).
 
     The same export gives the same bytes in every process and folder.
-    Raises ToolchainError without a C compiler, which the expected outputs of test_vectors.txt need.
+    Raises ToolchainError without a C compiler, which the expected outputs of test_vectors.txt need; ValueError for
+    numbers that export.real cannot hold, and Overflow, which is one, for those that the model cannot compute with.
     """
     runtime = resources.files("springline.codegen") / "runtime"
     headers = ("sl_mathf.h",) if export.real == "float" else ("sl_math.h", "sl_casadi.h")

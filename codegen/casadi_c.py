@@ -56,7 +56,7 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
     w, s = f"{flat}now.varying", f"{flat}now.varying + SL_NUMBER_W"
     x, p, r = f"{flat}x", f"{flat}p", f"{flat}r"
     state = "sl_time now, const sl_group *x, const sl_group *p, const sl_group *r"
-    observed = "sl_group *u, sl_group *e, sl_group *sigma"
+    computed = "sl_group *u, sl_group *e, sl_group *sigma, sl_group *wished"
     text = f"""{preamble}
 enum {{ SL_NUMBER_W = {program.size("w")} }};
 
@@ -91,8 +91,8 @@ static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
 {call("error", w, s, x, p, r, results=["(double *)e", "(double *)sigma"])}
 }}
 
-static inline void kernel_control({state}, {observed}) {{
-{call("control", w, s, x, p, r, results=["(double *)u", "(double *)e", "(double *)sigma"])}
+static inline void kernel_control({state}, {computed}) {{
+{call("control", w, s, x, p, r, results=["(double *)u", "(double *)e", "(double *)sigma", "(double *)wished"])}
 }}
 
 static inline void kernel_plant(sl_time now, const sl_group *x, const sl_group *u, const sl_group *p, const sl_group *r,
@@ -100,8 +100,8 @@ static inline void kernel_plant(sl_time now, const sl_group *x, const sl_group *
 {call("plant", w, s, x, flat + "u", p, r, results=["(double *)dx"])}
 }}
 
-static inline void kernel_closed({state}, sl_group *dx, {observed}) {{
-  kernel_control(now, x, p, r, u, e, sigma);
+static inline void kernel_closed({state}, sl_group *dx, {computed}) {{
+  kernel_control(now, x, p, r, u, e, sigma, wished);
   kernel_plant(now, x, (const sl_group *)u, p, r, dx);
 }}
 """

@@ -177,7 +177,7 @@ class LoopGraph(ValueGraph):
         [w] = self.add("signals", functions["signals"], [t, d, p, r])
         [s] = self.add("time", functions["time"], [w, p, r])
         self.add("error", functions["error"], [w, s, x, p, r])
-        [command, _, _] = self.add("control", functions["control"], [w, s, x, p, r])
+        [command, *_] = self.add("control", functions["control"], [w, s, x, p, r])
         self.add("plant", functions["plant"], [w, s, x, u, p, r])
         self.add("closed", functions["plant"], [w, s, x, command, p, r])
 

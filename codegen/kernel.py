@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -13,23 +15,32 @@ from numpy.typing import NDArray
 
 from springline.codegen import toolchain
 from springline.codegen.kernel_source import ONE_RUN, Engine, KernelOptions, KernelSource, print_kernel
+from springline.codegen.memory import memory
 from springline.codegen.program import Program, program
+from springline.model.base import COORDINATES
+from springline.model.parameters import Joint
 from springline.model.system import Structure, TableLayout
 
 __all__ = [
+    "CHATTERING",
     "METRICS",
+    "MOST_STEPS",
     "ONE_RUN",
+    "ROW",
     "STATUS",
     "Control",
     "Engine",
     "Kernel",
     "KernelOptions",
+    "LayoutError",
     "LoopSettings",
     "Runs",
     "Table",
+    "chatters",
     "compile_kernel",
     "joined",
     "kernel",
+    "quantity_name",
 ]
 
 Floats = NDArray[np.float64]
@@ -41,6 +52,7 @@ METRICS = (
     "steady_state_error",
     "iae",
     "U_max",
+    "chatter",
     "U_tv",
     "sigma_tv",
     "dq1_tv",
@@ -50,20 +62,78 @@ METRICS = (
 STATUS = ("ok", "diverged", "out_of_bounds", "stopped")
 """In the order of simulate.h."""
 
+ROW = ("q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U")
+"""Quantities of each joint, in the order of a trajectory row: they follow t, and the base coordinates follow them."""
+
+CHATTERING = 20.0
+"""1/s: a command whose `chatter` is larger chatters. Clean runs have 0 to 1.3."""
+_SWINGS = 4.0  # so many at least, or the one swing of a run that lasts no time would be taken for many in a second
+
+MOST_STEPS = 2**53
+"""Steps are counted in doubles too, and these hold no more whole numbers without a gap."""
+
+
+class LayoutError(RuntimeError):
+    """The compiled loop and this file do not agree on what is where in memory."""
+
+
+def _whole(name: str, value: object, low: int, high: int) -> int:
+    """`value` as an int. Raises ValueError if it is none, or not in low .. high."""
+    try:
+        number = operator.index(value)  # type: ignore[arg-type] # refuses what is no integer
+    except TypeError:
+        number = None
+    if number is None or isinstance(value, bool) or not low <= number <= high:
+        raise ValueError(f"{name} is {_shown(value)}, expected a whole number from {low} to {high}")
+    return number
+
+
+def _real(name: str, value: object, *, positive: bool = False, infinite: bool = False) -> float:
+    """`value` as a float. Raises ValueError if it is none, not finite (unless `infinite`), or not positive if asked."""
+    try:
+        number = float(value)  # type: ignore[arg-type] # refuses what is no number
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not (math.isfinite(number) or (infinite and number == math.inf)) or (positive and number <= 0.0):
+        expected = f"a {'positive' if positive else 'finite'} number" + (" or inf" if infinite else "")
+        raise ValueError(f"{name} is {_shown(value)}, expected {expected}")
+    return number
+
+
+def _shown(value: object) -> str:
+    """A value for a message; an integer that Python would refuse to print, by its size."""
+    if isinstance(value, int) and abs(value) >= 10**40:
+        return f"an integer of {value.bit_length()} bits"
+    return repr(value)
+
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Knots of one table signal: interval k starts at t0 + k dt; coefficients (intervals, channels, 4), tau in s."""
+    """Knots of one table signal: interval k starts at t0 + k dt; coefficients (intervals, channels, 4), tau in s.
+
+    Raises ValueError for what the loop could not find an interval in.
+    """
 
     t0: float
     dt: float
     periodic: bool
     coefficients: Floats
 
+    def __post_init__(self) -> None:
+        _real("t0 of a table", self.t0)
+        _real("dt of a table", self.dt, positive=True)
+        if self.coefficients.ndim != 3 or len(self.coefficients) == 0:
+            shape = self.coefficients.shape
+            raise ValueError(f"coefficients of a table have shape {shape}, expected (at least 1, channels, 4)")
+        _real("end of a table, t0 + intervals * dt,", self.t0 + len(self.coefficients) * self.dt)
+
 
 @dataclass(frozen=True, slots=True)
 class LoopSettings:
-    """What the loop is told about every run of a batch: steps of h s, bound on |x_i|, sampling, output, thresholds."""
+    """What the loop is told about every run of a batch: steps of h s, bound on |x_i|, sampling, output, thresholds.
+
+    Raises ValueError, with the name and what was expected, for numbers that the loop cannot count or step with.
+    """
 
     steps: int
     step: float
@@ -73,6 +143,21 @@ class LoopSettings:
     response_band: float = 0.10
     settling_band: float = 0.05
     start_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        checked = {
+            "steps": _whole("steps", self.steps, 0, MOST_STEPS),
+            "step": _real("step", self.step, positive=True),
+            "bound": _real("bound", self.bound, positive=True, infinite=True),
+            "hold": _whole("hold", self.hold, 1, MOST_STEPS),
+            "output_every": _whole("output_every", self.output_every, 0, MOST_STEPS),
+            "response_band": _real("response_band", self.response_band),
+            "settling_band": _real("settling_band", self.settling_band),
+            "start_time": _real("start_time", self.start_time),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)  # the numbers that were checked, whatever type they came in
+        _real("end, start_time + steps * step,", self.start_time + self.steps * self.step)
 
     @property
     def rows(self) -> int:
@@ -88,7 +173,8 @@ class Runs:
 
     metrics      (runs, joints, len(METRICS)), NaN where there is none
     final_state  (runs, 4n), the last finite state;  end_time (runs,), s
-    status       (runs,) index into STATUS;  quantity (runs,) state entry that left its bound, or -1
+    status       (runs,) index into STATUS
+    quantity     (runs,) place in a trajectory row, t not counted, of what left its bound (`quantity_name`), or -1
     trajectory   (runs, rows, columns) or None;  rows (runs,) rows that were written
     """
 
@@ -115,7 +201,21 @@ class Control:
     stop: ctypes.c_int32 = field(default_factory=ctypes.c_int32)
 
 
-class _Table(ctypes.Structure):
+class _Struct(ctypes.Structure):
+    """A C struct made of named values. Raises ValueError for one that C would hold as another, as ctypes does not."""
+
+    def __init__(self, **values: object) -> None:
+        super().__init__(**values)
+        for name, *_ in self._fields_:
+            given = values.pop(name)
+            held = getattr(self, name)
+            if held != given:
+                raise ValueError(f"{name} is {_shown(given)}, which C would take for {held!r}")
+        if values:
+            raise TypeError(f"{type(self).__name__} has no {', '.join(values)}")
+
+
+class _Table(_Struct):
     _fields_ = [
         ("t0", ctypes.c_double),
         ("dt", ctypes.c_double),
@@ -126,7 +226,7 @@ class _Table(ctypes.Structure):
     ]
 
 
-class _Job(ctypes.Structure):
+class _Job(_Struct):
     _fields_ = [
         ("first", ctypes.c_int64),
         ("last", ctypes.c_int64),
@@ -153,6 +253,20 @@ class _Job(ctypes.Structure):
     ]
 
 
+# What springline_layout says, in its order.
+_LAYOUT = (
+    "runs side by side",
+    "bytes of a job",
+    "bytes of a table",
+    "parameters of a run",
+    "tables",
+    "states",
+    "metrics",
+    "columns of a trajectory",
+    "statuses",
+)
+
+
 class Kernel:
     """The compiled loop of one Program.
 
@@ -160,6 +274,7 @@ class Kernel:
     parameters  slot keys in the order of the columns that `run` takes
     width       runs that are simulated together (lanes x groups x packs)
     library     the shared library, in the cache
+    Raises LayoutError if the C does not have the sizes that this file reads and writes, ToolchainError.
     """
 
     def __init__(self, program: Program, source: KernelSource, compiler: toolchain.Compiler | None = None) -> None:
@@ -169,10 +284,19 @@ class Kernel:
         handle = toolchain.load(self.library)
         self._simulate: Any = handle.springline_simulate
         self._simulate.restype = None
-        layout = (ctypes.c_int64 * 6)()
-        handle.springline_layout(layout)
-        self.width, parameters, self._states, self._metrics, self._columns, tables = layout
-        assert parameters == len(self.parameters) and tables == len(self.program.system.tables)
+        system = program.system
+        self._states, self._columns = system.x.numel(), 1 + len(ROW) * system.n + len(COORDINATES)
+        self.width = _checked_layout(
+            handle.springline_layout,
+            ctypes.sizeof(_Job),
+            ctypes.sizeof(_Table),
+            len(self.parameters),
+            len(system.tables),
+            self._states,
+            system.n * len(METRICS),
+            self._columns,
+            len(STATUS),
+        )
 
     def run(
         self,
@@ -184,10 +308,11 @@ class Kernel:
     ) -> Runs:
         """Simulate one run per row of `parameters` (runs, len(self.parameters)), in this thread, without the GIL.
 
-        Raises ValueError if `parameters` or `tables` do not have the shape the kernel was built for.
+        Raises ValueError if `parameters` or `tables` do not have the shape the kernel was built for, and for results
+        that this machine's memory cannot hold.
         """
         parameters = np.ascontiguousarray(parameters, dtype=np.float64)
-        runs = parameters.shape[0]
+        runs = len(parameters)
         if parameters.shape != (runs, len(self.parameters)):
             raise ValueError(f"parameters have shape {parameters.shape}, expected (runs, {len(self.parameters)})")
         layouts: Sequence[TableLayout] = self.program.system.tables
@@ -196,15 +321,26 @@ class Kernel:
         c_tables = (_Table * max(len(tables), 1))()
         coefficients = [np.ascontiguousarray(table.coefficients, dtype=np.float64) for table in tables]
         for i, (table, layout, data) in enumerate(zip(tables, layouts, coefficients, strict=True)):
-            if data.ndim != 3 or data.shape[1:] != (len(layout.channels), 4):
+            if data.shape[1:] != (len(layout.channels), 4):
                 raise ValueError(
                     f"table {layout.signal}: coefficients have shape {data.shape}, "
                     f"expected (intervals, {len(layout.channels)}, 4)"
                 )
             c_tables[i] = _Table(
-                table.t0, table.dt, data.shape[0], data.shape[1], int(table.periodic), data.ctypes.data
+                t0=table.t0,
+                dt=table.dt,
+                intervals=data.shape[0],
+                channels=data.shape[1],
+                periodic=int(table.periodic),
+                coefficients=data.ctypes.data,
             )
         rows = settings.rows
+        needed, there = 8 * runs * rows * self._columns, memory()
+        if needed > there:
+            raise ValueError(
+                f"output_every is {settings.output_every}: {runs} x {rows} trajectory rows of {self._columns} numbers "
+                f"need {needed / 1e9:.3g} GB of memory, and there are {there / 1e9:.3g}"
+            )
         result = Runs(
             metrics=np.full((runs, self.program.system.n, len(METRICS)), np.nan),
             final_state=np.zeros((runs, self._states)),
@@ -240,6 +376,37 @@ class Kernel:
         )
         self._simulate(ctypes.byref(job))
         return result
+
+
+def _checked_layout(layout: Any, *expected: int) -> int:
+    """How many runs go side by side, once the loop's sizes are those `expected`. Raises LayoutError if they are not."""
+    layout.restype = ctypes.c_int64
+    layout.argtypes = [ctypes.c_void_p, ctypes.c_int64]
+    sizes = (ctypes.c_int64 * len(_LAYOUT))()
+    count = layout(sizes, len(_LAYOUT))
+    wrong = [
+        f"{name}: {found}, expected {size}"
+        for name, found, size in zip(_LAYOUT[1:], sizes[1:], expected, strict=True)
+        if found != size
+    ]
+    if count != len(_LAYOUT):
+        wrong = [f"sizes: {count}, expected {len(_LAYOUT)}"]
+    if wrong:
+        raise LayoutError(f"loop.c and kernel.py do not fit together ({'; '.join(wrong)}): install springline anew")
+    return int(sizes[0])
+
+
+def chatters(chatter: Floats, duration: Floats | float) -> NDArray[np.bool_]:
+    """Which commands chatter: they go to and fro often in a second, and more than twice in the half that was looked at.
+
+    chatter   the metric, 1/s;  duration  of the runs, s
+    """
+    return np.asarray((chatter > CHATTERING) & (chatter * (np.asarray(duration) / 2.0) > _SWINGS), dtype=np.bool_)
+
+
+def quantity_name(joints: Sequence[Joint], quantity: int) -> str:
+    """Column name of what left its bound, "dq2_lift"; `quantity` as in Runs."""
+    return f"{ROW[quantity // len(joints)]}_{joints[quantity % len(joints)].name}"
 
 
 def compile_kernel(

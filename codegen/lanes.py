@@ -139,7 +139,7 @@ class _Emitter:
                 names[i] = f"d{k}"
         signal = [f"{q}_{j}" for q in ("q1d", "dq1d", "ddq1d") for j in joints]
         name(outputs["signals"][0], signal + [f"{d}{c}" for d in ("", "d_", "dd_") for c in base])
-        for part, label in zip(outputs["control"], ("command", "e", "sigma"), strict=True):
+        for part, label in zip(outputs["control"], ("command", "e", "sigma", "wished"), strict=True):
             name(part, [f"{label}_{j}" for j in joints])
         return names
 
@@ -383,7 +383,7 @@ class _Emitter:
         run, uniform, varying = (list(self.slots[b]) for b in (Binding.RUN, Binding.UNIFORM, Binding.VARYING))
         given = "const sl_group *p, const sl_group *r"
         now = "sl_time now, const sl_group *x"
-        control = {"u": n, "e": n, "sigma": n}
+        control = {"u": n, "e": n, "sigma": n, "wished": n}
 
         def into(name: str) -> Callable[[int, str], str]:
             return lambda k, g: f"{name}[{k}][{g}]"

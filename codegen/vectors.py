@@ -7,8 +7,9 @@ replays them is checked against code that is not its own.
 from __future__ import annotations
 
 import ctypes
+import math
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -25,6 +26,22 @@ TIME_STEP = 1e-4
 """Step of the plant vectors, s."""
 
 Numbers = NDArray[Any]  # float64 or float32
+
+
+class Overflow(ValueError):
+    """With an export's numbers the model leaves the finite numbers, and no test vector can be.
+
+    key, value  the parameter that is farthest from 1, by orders of magnitude: the likely cause
+    """
+
+    def __init__(self, export: Export, what: str) -> None:
+        known = [(slot.key, value) for slot, value in zip(export.slots, export.values, strict=True)]
+        finite = [(key, value) for key, value in known if value != 0.0 and math.isfinite(value)]
+        self.key, self.value = max(finite, key=lambda item: abs(math.log10(abs(item[1]))))
+        super().__init__(
+            f"{what} is not a finite {export.real} at an ordinary state: expected parameters that the model can "
+            "compute with, and this is the one farthest from 1"
+        )
 
 
 class _Model:
@@ -51,7 +68,7 @@ class _Model:
 
 
 def test_vectors(export: Export, interface: TypedInterface, sources: Mapping[str, bytes]) -> bytes:
-    """The file. sources: the model's C files and what they include, by path. Raises ToolchainError."""
+    """The file. sources: the model's C files and what they include, by path. Raises ToolchainError, Overflow."""
     model = _Model(export, sources)
     names = {name: " ".join(field.name for field in fields) for name, fields in interface.structures.items()}
     lines = [
@@ -61,8 +78,8 @@ def test_vectors(export: Export, interface: TypedInterface, sources: Mapping[str
         f"plant (a step of {TIME_STEP!r} s, base motion constant): {names['base']} {names['state']} {names['command']}",
         f"      -> {names['state']}",
     ]
-    rows = [f"control {_hex(row)}" for row in _control_rows(interface, model)]
-    rows += [f"plant {_hex(row)}" for row in _plant_rows(interface, model)]
+    rows = [f"control {_hex(row)}" for row in _finite(export, control_outputs(export), _control_rows(interface, model))]
+    rows += [f"plant {_hex(row)}" for row in _finite(export, names["state"].split(), _plant_rows(interface, model))]
     return "".join([*(f"# {line}\n" for line in lines), *(f"{row}\n" for row in rows)]).encode()
 
 
@@ -70,6 +87,15 @@ def control_outputs(export: Export) -> list[str]:
     """What a control vector's outputs are called, in order: those of the model's control, then the flags of limits."""
     quantities = ("U", "U_s", "U_f", "e", "sigma", "saturated", "a_limited")
     return [f"{quantity}_{joint.name}" for quantity in quantities for joint in export.system.joints]
+
+
+def _finite(export: Export, outputs: Sequence[str], rows: Iterable[list[float]]) -> Iterator[list[float]]:
+    """The rows, which end with `outputs`. Raises Overflow if one of these is not finite."""
+    for row in rows:
+        for name, value in zip(outputs, row[-len(outputs) :], strict=True):
+            if not math.isfinite(value):
+                raise Overflow(export, name)
+        yield row
 
 
 def _hex(numbers: Sequence[float]) -> str:

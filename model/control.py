@@ -17,9 +17,10 @@ U_MAX = Parameter("U_max", "{F}", (float("inf"), float("inf")), "limit on the mo
 
 @dataclass(frozen=True, slots=True)
 class ControlSignals:
-    """What the controller computes, each n x 1: total command, its two parts, error, sliding variable."""
+    """What the controller computes, each n x 1: command, what it wished before U_max, its two parts, error, sigma."""
 
     command: ca.SX
+    wished: ca.SX
     slow: ca.SX
     fast: ca.SX
     error: ca.SX
@@ -58,5 +59,6 @@ def control(
     u_e = reaching_rate(law, sigma, p, log_form) - surface_rate
     slow = slow_control(ddq_d, u_e, nominal, motor_inertia)
     fast = fast_control(dq1, dq2, p.K_f)
-    command = ca.fmin(ca.fmax(slow + fast, -p.U_max), p.U_max)
-    return ControlSignals(command, slow, fast, error, sigma)
+    wished = slow + fast
+    command = ca.fmin(ca.fmax(wished, -p.U_max), p.U_max)
+    return ControlSignals(command, wished, slow, fast, error, sigma)

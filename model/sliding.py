@@ -48,14 +48,24 @@ NU = Parameter("nu", "1", 2.0, "even power inside the logarithm", EVEN)
 ZETA = Parameter("zeta", "1", 0.9, "exponent of the variable power", UNIT_OPEN)
 
 
+LARGEST_SURFACE_EXPONENT = 99
+"""Powers are unrolled into products: larger exponents make code that nobody needs, and at last no end of it."""
+
+
 @dataclass(frozen=True, slots=True)
 class SurfaceExponents:
-    """Positive odd integers l > m and r > p of the surface (22)."""
+    """Positive odd integers l > m and r > p of the surface (22). Raises ValueError beyond LARGEST_SURFACE_EXPONENT."""
 
     l: int = 3  # noqa: E741 - the paper's letter
     m: int = 1
     p: int = 1
     r: int = 3
+
+    def __post_init__(self) -> None:
+        for name in ("l", "m", "p", "r"):
+            value = getattr(self, name)
+            if not isinstance(value, int) or not 1 <= value <= LARGEST_SURFACE_EXPONENT or value % 2 == 0:
+                raise ValueError(f"{name} is {value}, expected an odd integer from 1 to {LARGEST_SURFACE_EXPONENT}")
 
 
 def odd_power(e: ca.SX, exponent: Fraction) -> tuple[ca.SX, ca.SX]:

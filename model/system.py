@@ -302,7 +302,13 @@ class System:
                 [],
                 ["x"],
             ),
-            function("loop_control", [w, x], [s.command, s.error, s.sigma], ["w", "x"], ["u", "e", "sigma"]),
+            function(
+                "loop_control",
+                [w, x],
+                [s.command, s.error, s.sigma, s.wished],
+                ["w", "x"],
+                ["u", "e", "sigma", "wished"],
+            ),
             function("loop_error", [w, x], [s.error, s.sigma], ["w", "x"], ["e", "sigma"]),
             function("loop_plant", [w, x, u], [dx], ["w", "x", "u"], ["dx"]),
         ]

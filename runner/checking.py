@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
+from springline.codegen.kernel import MOST_STEPS
 from springline.model.base import COORDINATES
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE
@@ -144,11 +144,13 @@ def _whole_problems(document: Document, key: str, where: str) -> list[Problem]:
         return []
     time, step = document[table][name], document["simulation"]["step"]
     ratio = time / step
-    if math.isfinite(ratio) and round(ratio) >= 1 and abs(ratio - round(ratio)) <= _WHOLE * ratio:
+    if ratio > MOST_STEPS:
+        text = f"expected at most {MOST_STEPS * step:.6g} s, {MOST_STEPS} times simulation.step = {step!r} s"
+        return [Problem(where, key, text, f"{time!r} s")]
+    if round(ratio) >= 1 and abs(ratio - round(ratio)) <= _WHOLE * ratio:
         return []
-    text = f"expected a whole multiple of simulation.step = {step!r} s"
-    if math.isfinite(ratio):
-        text += f" (the nearest is {max(round(ratio), 1) * step:.12g} s)"
+    nearest = max(round(ratio), 1) * step
+    text = f"expected a whole multiple of simulation.step = {step!r} s (the nearest is {nearest:.12g} s)"
     return [Problem(where, key, text, f"{time!r} s")]
 
 

@@ -13,12 +13,13 @@ from typing import Annotated, Any, Literal, cast, get_args
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError, create_model
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
+from springline.codegen.kernel import MOST_STEPS
 from springline.model.base import COORDINATES
 from springline.model.drive import EPSILON
 from springline.model.lagrange import Mechanism
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
-from springline.model.sliding import LAWS, LogForm
+from springline.model.sliding import LARGEST_SURFACE_EXPONENT, LAWS, LogForm
 from springline.model.system import Structure, control_parameters
 from springline.runner.errors import Problem, unknown
 from springline.runner.tables import ENDS, UNITS
@@ -115,12 +116,12 @@ def plant_value(own: Leaf, scale: Leaf) -> Leaf:
     return Leaf(expected, check)
 
 
-def whole(*, odd: bool = False) -> Leaf:
-    """A positive integer, odd if so asked."""
-    expected = "a positive odd integer" if odd else "a positive integer"
+def whole(most: int, *, odd: bool = False) -> Leaf:
+    """A positive integer up to `most`, odd if so asked."""
+    expected = f"a positive {'odd ' * odd}integer up to {most}"
 
     def check(value: object) -> int:
-        if isinstance(value, int) and not isinstance(value, bool) and value >= 1 and (value % 2 or not odd):
+        if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= most and (value % 2 or not odd):
             return value
         raise _wrong(f"expected {expected}")
 
@@ -185,15 +186,18 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, protected_namespaces=())
 
 
+_EXPONENT = whole(LARGEST_SURFACE_EXPONENT, odd=True)
+
+
 class ControlStructure(Section):
     """The keys of [control] that are no numbers of the model."""
 
     law: Annotated[str, choice("law", tuple(LAWS))] = _DEFAULT.law
     log_form: Annotated[str, choice("log_form", get_args(LogForm))] = _DEFAULT.log_form
-    l: Annotated[int, whole(odd=True)] = _DEFAULT.exponents.l  # noqa: E741 - the paper's letter
-    m: Annotated[int, whole(odd=True)] = _DEFAULT.exponents.m
-    p: Annotated[int, whole(odd=True)] = _DEFAULT.exponents.p
-    r: Annotated[int, whole(odd=True)] = _DEFAULT.exponents.r
+    l: Annotated[int, _EXPONENT] = _DEFAULT.exponents.l  # noqa: E741 - the paper's letter
+    m: Annotated[int, _EXPONENT] = _DEFAULT.exponents.m
+    p: Annotated[int, _EXPONENT] = _DEFAULT.exponents.p
+    r: Annotated[int, _EXPONENT] = _DEFAULT.exponents.r
     fast: Annotated[bool, flag()] = True
     mode: Annotated[str, choice("mode", get_args(Mode))] = "continuous"
     period: Annotated[float | None, number("s", POSITIVE)] = None
@@ -205,7 +209,7 @@ class Simulation(Section):
     duration: Annotated[float, number("s", POSITIVE)] = 4.0
     step: Annotated[float, number("s", POSITIVE)] = 1e-4
     integrator: Annotated[str, choice("integrator", INTEGRATORS)] = INTEGRATORS[0]
-    output_every: Annotated[int, whole()] = 10
+    output_every: Annotated[int, whole(MOST_STEPS)] = 10
     bound: Annotated[float, number("SI", LIMIT)] = 1e6
     response_band: Annotated[float, number("1", UNIT_OPEN)] = 0.10
     settling_band: Annotated[float, number("1", UNIT_OPEN)] = 0.05

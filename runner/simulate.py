@@ -12,8 +12,10 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from springline.codegen.kernel import (
+    CHATTERING,
     METRICS,
     ONE_RUN,
+    ROW,
     STATUS,
     Control,
     Engine,
@@ -21,8 +23,11 @@ from springline.codegen.kernel import (
     LoopSettings,
     Runs,
     Table,
+    chatters,
     kernel,
+    quantity_name,
 )
+from springline.codegen.memory import memory
 from springline.model.base import COORDINATES
 from springline.model.parameters import Joint
 from springline.model.system import System
@@ -32,8 +37,10 @@ from springline.runner.tables import Table as SignalTable
 
 Floats = NDArray[np.float64]
 _MOST_ROWS = 10_000_000
+_COPIES = 3  # of a trajectory in memory: the loop's rows, the table's columns, the file
 Progress = Callable[[float], None]
 
+_ROW_UNITS = {"dq1": "{q}/s", "dq2": "{q}/s", "sigma": "{q}/s", "U": "{F}"}  # all others are coordinates
 _METRIC_UNITS = {
     "response_time": "s",
     "settling_time": "s",
@@ -41,6 +48,7 @@ _METRIC_UNITS = {
     "steady_state_error": "{q}",
     "iae": "{q} s",
     "U_max": "{F}",
+    "chatter": "1/s",
     "U_tv": "{F}",
     "sigma_tv": "{q}/s",
     "dq1_tv": "{q}/s",
@@ -54,7 +62,8 @@ class Result:
     trajectory  columns t, q1_, dq1_, q2_, dq2_, q1d_, e_, sigma_, U_ per joint and the base coordinates
     metrics     one row; see metrics.h for their definitions; null where there is none
     status      "ok", "diverged" or "out_of_bounds"
-    message     one sentence: for a run that stopped, the quantity and the time at which it left its bound
+    message     one sentence: for a run that stopped, the quantity and the time at which it left its bound; for one that
+                chatters, how much
     """
 
     trajectory: pa.Table
@@ -70,24 +79,12 @@ def field(name: str, unit: str, kind: pa.DataType | None = None) -> pa.Field:
 
 def trajectory_schema(system: System) -> pa.Schema:
     """Columns of a trajectory, in the order of the loop's rows."""
-
-    def per_joint(quantity: str, suffix: str = "", force: bool = False) -> list[pa.Field]:
-        return [field(f"{quantity}_{j.name}", (j.force if force else j.unit) + suffix) for j in system.joints]
-
-    return pa.schema(
-        [
-            field("t", "s"),
-            *per_joint("q1"),
-            *per_joint("dq1", "/s"),
-            *per_joint("q2"),
-            *per_joint("dq2", "/s"),
-            *per_joint("q1d"),
-            *per_joint("e"),
-            *per_joint("sigma", "/s"),
-            *per_joint("U", force=True),
-            *(field(c.symbol, c.unit) for c in COORDINATES),
-        ]
-    )
+    per_joint = [
+        field(f"{quantity}_{j.name}", _ROW_UNITS.get(quantity, "{q}").format(q=j.unit, F=j.force))
+        for quantity in ROW
+        for j in system.joints
+    ]
+    return pa.schema([field("t", "s"), *per_joint, *(field(c.symbol, c.unit) for c in COORDINATES)])
 
 
 def metrics_schema(joints: Sequence[Joint]) -> pa.Schema:
@@ -138,23 +135,27 @@ def kernel_tables(tables: Sequence[SignalTable]) -> list[Table]:
     return result
 
 
-def state_name(system: System, index: int) -> str:
-    """Column name of entry `index` of x."""
-    part, joint = divmod(index, system.n)
-    return f"{('q1', 'dq1', 'q2', 'dq2')[part]}_{system.joints[joint].name}"
-
-
 def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tuple[str, str]:
     """Status and message of one run."""
     status, end = STATUS[runs.status[run]], runs.end_time[run]
     if status == "ok":
-        return status, f"done: {end:g} s in {settings.steps} steps"
-    quantity = state_name(system, int(runs.quantity[run]))
+        return status, f"done: {end:g} s in {settings.steps} steps{_chatter_text(system.joints, runs, run)}"
+    place = int(runs.quantity[run])
+    quantity = quantity_name(system.joints, place)
     left = "the finite numbers" if status == "diverged" else f"its bound (|{quantity}| <= {settings.bound:g})"
-    return (
-        status,
-        f"{status}: {quantity} left {left} at t = {end + settings.step:g} s; results end at t = {end:g} s",
-    )
+    if place < system.x.numel():
+        when = f"at t = {end + settings.step:g} s; results end at t = {end:g} s"
+    else:  # the state that it was computed from is still there
+        when = f"at t = {end:g} s, where results end"
+    return status, f"{status}: {quantity} left {left} {when}"
+
+
+def _chatter_text(joints: Sequence[Joint], runs: Runs, run: int) -> str:
+    """Of a run that chatters, which command does it and how much; "" for a calm one."""
+    chatter = runs.metrics[run, :, METRICS.index("chatter")]
+    judged = zip(joints, chatter, chatters(chatter, runs.end_time[run]), strict=True)
+    found = [f"U_{joint.name} by {value:.3g} 1/s" for joint, value, does in judged if does]
+    return f"; chattering: {' and '.join(found)} (calm is up to {CHATTERING:g})" if found else ""
 
 
 def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress | None = None) -> Result:
@@ -163,12 +164,12 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     engine    "lanes", or "casadi" for the C that CasADi prints; the results are the same to the last bit
     progress  called now and then with the share that is done (0 .. 1)
     Raises TypeError for what is no Scenario, InputError (a ValueError) if the trajectory would have more than 10
-    million rows, ValueError for an unknown engine, ToolchainError if there is no C compiler.
+    million rows or not fit into memory, ValueError for an unknown engine, ToolchainError if there is no C compiler.
     """
     expect_scenario(scenario)
     if engine not in get_args(Engine):
         raise ValueError(f"engine is {engine!r}, expected one of {', '.join(get_args(Engine))}")
-    _refuse_endless(scenario)
+    refuse_large(scenario)
     loop = kernel(scenario.structure(), scenario.control_every > 0, replace(ONE_RUN, engine=engine))
     settings = loop_settings(scenario, trajectory=True)
     tables = kernel_tables(scenario.tables())
@@ -181,14 +182,27 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     return Result(trajectory, metrics_table(system.joints, runs), status, message)
 
 
-def _refuse_endless(scenario: Scenario) -> None:
-    """Raise InputError if the trajectory would not fit into any memory."""
-    rows = scenario.steps // scenario.output_every + 1
-    if rows > _MOST_ROWS:
-        enough = -(-scenario.steps // _MOST_ROWS)
-        key = "simulation.output_every"
-        text = f"expected at least {enough} for {scenario.steps} steps: {rows} rows are more than {_MOST_ROWS}"
-        raise InputError(Problem("scenario", key, text, str(scenario.output_every)))
+def row_size(scenario: Scenario) -> int:
+    """Bytes of the numbers in a trajectory row."""
+    return 8 * len(trajectory_schema(scenario.system()))
+
+
+def refuse_rows(scenario: Scenario, most: int, why: str) -> None:
+    """Raise InputError if the trajectory has more rows than `most`; `why` says what sets this limit."""
+    rows = loop_settings(scenario, trajectory=True).rows
+    if rows > most:
+        enough = -(-scenario.steps // max(most - 2, 1))  # the first row and the last come besides
+        text = f"expected at least {enough} for {scenario.steps} steps: {rows} rows are more than {most}, {why}"
+        raise InputError(Problem(scenario.source, "simulation.output_every", text, str(scenario.output_every)))
+
+
+def refuse_large(scenario: Scenario) -> None:
+    """Raise InputError if the trajectory, with the copies that become tables and files, would not fit into memory."""
+    refuse_rows(scenario, _MOST_ROWS, "the most of a trajectory")
+    there = memory()
+    refuse_rows(
+        scenario, there // (_COPIES * row_size(scenario)), f"all that {there / 1e9:.3g} GB of memory have room for"
+    )
 
 
 def _watched(

@@ -16,7 +16,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import compute
 
-from springline.codegen.kernel import METRICS, STATUS
+from springline.codegen.kernel import CHATTERING, METRICS, STATUS, chatters
 from springline.model.parameters import Joint
 from springline.runner import sampling
 from springline.runner.dataset import Dataset
@@ -31,6 +31,7 @@ QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 WORST = 10
 
 _OUTCOMES = STATUS[:3]
+_CHATTERING = "chattering"
 _SHOWN = 20_000  # rows that figures are drawn from
 
 
@@ -46,7 +47,8 @@ class Distribution:
 class Summary:
     """What the runs of a dataset have in common, and which are the worst.
 
-    outcomes  per group of the sweep ("all" if there is one only), the number of runs by status
+    outcomes  per group of the sweep ("all" if there is one only), the number of runs by status; "chattering" counts
+              those of the "ok" runs that chatter
     metrics   by column
     worst     rows of the dataset: runs that stopped, the earliest first, then those with the largest steady-state error
     shown     rows for figures: all, or a random subset of a large dataset
@@ -62,7 +64,7 @@ class Summary:
     @property
     def stopped(self) -> int:
         """Runs that diverged or left their bounds."""
-        return sum(count for group in self.outcomes.values() for status, count in group.items() if status != "ok")
+        return sum(group[status] for group in self.outcomes.values() for status in _OUTCOMES if status != "ok")
 
 
 def summarize(plan: Plan, dataset: Dataset) -> Summary:
@@ -73,7 +75,8 @@ def summarize(plan: Plan, dataset: Dataset) -> Summary:
     runs = sum(chunk.runs for chunk in chunks)
     parts = [dataset.part_name(chunk.number) for chunk in chunks]
     names = group_names(plan)
-    outcomes = {name: dict.fromkeys(_OUTCOMES, 0) for name in names}
+    joints = plan.groups[0].work.system.joints
+    outcomes = {name: dict.fromkeys((*_OUTCOMES, _CHATTERING), 0) for name in names}
     # Gathered as arrays of their final length: small tables would be many, and each a hole in the memory.
     rows = sum(np.count_nonzero(_picked(chunk, runs)) for chunk in chunks)
     gathered = {field.name: np.empty(rows, field.type.to_pandas_dtype()) for field in plan.schema}
@@ -82,12 +85,13 @@ def summarize(plan: Plan, dataset: Dataset) -> Summary:
         table = dataset.read_part(part)
         for outcome in _OUTCOMES:
             outcomes[names[chunk.group.number]][outcome] += int(np.count_nonzero(_ended(table, outcome)))
+        outcomes[names[chunk.group.number]][_CHATTERING] += int(np.count_nonzero(chattering(table, joints)))
         picked = table.filter(pa.array(_picked(chunk, runs)))
         for name, column in gathered.items():
             column[row : row + len(picked)] = picked[name].to_numpy()
         row += len(picked)
     shown = pa.table([pa.array(gathered.pop(f.name), f.type, from_pandas=True) for f in plan.schema], plan.schema)
-    metrics = _distributions(dataset, parts, shown, plan.groups[0].work.system.joints)
+    metrics = _distributions(dataset, parts, shown, joints)
     return Summary(runs, outcomes, metrics, units(shown), _worst(dataset, parts, metrics), shown)
 
 
@@ -124,6 +128,13 @@ def _worst(dataset: Dataset, parts: Sequence[str], metrics: Mapping[str, Distrib
 def _numbers(table: pa.Table, column: str) -> Floats:
     """A column of numbers, NaN for null."""
     return np.asarray(table[column].to_numpy(), dtype=np.float64)
+
+
+def chattering(table: pa.Table, joints: Sequence[Joint]) -> NDArray[np.bool_]:
+    """Which runs chatter, on any joint; a run that stopped does not."""
+    end = _numbers(table, "t_end")
+    columns = [chatters(_numbers(table, f"chatter_{joint.name}"), end) for joint in joints]
+    return np.asarray(np.any(columns, axis=0), dtype=np.bool_)
 
 
 def _ended(table: pa.Table, outcome: str) -> NDArray[np.bool_]:
@@ -176,12 +187,13 @@ Rows = tuple[list[str], list[list[str]]]
 
 def outcome_rows(summary: Summary) -> Rows:
     """How many runs of each group ended how."""
-    header = ["group", "runs", "ok", "diverged", "out of bounds", "stopped early"]
+    header = ["group", "runs", "ok", "of these chattering", "diverged", "out of bounds", "stopped early"]
     rows = []
     for name, counts in summary.outcomes.items():
-        total = sum(counts.values())
+        total = sum(counts[outcome] for outcome in _OUTCOMES)
         share = (total - counts["ok"]) / total if total else 0.0
-        rows.append([name, str(total), *(str(counts[outcome]) for outcome in _OUTCOMES), f"{share:.2%}"])
+        shown = ("ok", _CHATTERING, *_OUTCOMES[1:])
+        rows.append([name, str(total), *(str(counts[outcome]) for outcome in shown), f"{share:.2%}"])
     return header, rows
 
 
@@ -222,7 +234,10 @@ def markdown(plan: Plan, summary: Summary, figures: Sequence[str], name: str) ->
         f"# {name}",
         f"{summary.runs:,} of {plan.runs:,} runs of `{plan.sweep.scenario.source}` ({plan.sweep.method}, "
         f"seed {plan.sweep.seed}).\n\n{varied}",
-        "## What became of the runs\n\n" + _markdown_table(outcome_rows(summary)),
+        "## What became of the runs\n\n"
+        + _markdown_table(outcome_rows(summary))
+        + f"\n\nA run chatters where `chatter_` of a joint is above {CHATTERING:g} 1/s: its command swings so often "
+        "that its other metrics say little.",
         *(f"![{figure.rpartition('.')[0]}]({figure})" for figure in figures),
         "## Metrics\n\nQuantiles over the runs that have the metric; the last column is the share that has not.\n\n"
         + _markdown_table(metric_rows(summary)),

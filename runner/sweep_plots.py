@@ -4,7 +4,7 @@ of a sweep side by side.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
@@ -21,7 +22,7 @@ from springline.model.parameters import Joint
 from springline.runner import sampling
 from springline.runner.plan import Plan
 from springline.runner.plots import LINES, PAGE, house_style, label, legend_above, panels
-from springline.runner.summary import Summary, group_names
+from springline.runner.summary import Summary, chattering, group_names
 
 Floats = NDArray[np.float64]
 
@@ -32,6 +33,8 @@ _BINS = 40
 _POINTS = 800
 _STOPPED = "#D55E00"
 _NEVER = "0.75"
+_HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": "white", "hatch": "//////", "linewidth": 0.0}
+_RING: Mapping[str, Any] = {"markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.7}
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,10 @@ class _Runs:
     @property
     def ok(self) -> NDArray[np.bool_]:
         return np.asarray(np.array(self.table["status"].to_pylist()) == "ok", dtype=np.bool_)
+
+    @property
+    def chattering(self) -> NDArray[np.bool_]:
+        return chattering(self.table, self.joints)
 
     def title(self, column: str) -> str:
         """Axis label of a column."""
@@ -97,7 +104,10 @@ def summary_figures(plan: Plan, summary: Summary) -> dict[str, Figure]:
 
 
 def _map(runs: _Runs) -> Figure:
-    """Settling time over two keys, a row a group and a column a joint; where a run stopped, that is shown instead."""
+    """Settling time over two keys, a row a group and a column a joint; where a run stopped, that is shown instead.
+
+    Cells in which most runs that ended well chatter are hatched: their settling time is nothing to choose them by.
+    """
     shown = min(len(runs.names), _MOST_GROUPS)
     figure, grid = panels(shown, len(runs.joints), width=PAGE, height=2.5, share_x=False)
     columns = [f"settling_time_{joint.name}" for joint in runs.joints]
@@ -118,6 +128,8 @@ def _map(runs: _Runs) -> Figure:
             _shade(axes, edges, np.where(ok > 0, 1.0, np.nan), _NEVER)
             mesh = axes.pcolormesh(*edges, settled.T, norm=norm, cmap="viridis", rasterized=True)
             _shade(axes, edges, np.where(stopped > 0.5, 1.0, np.nan), _STOPPED)
+            chatters = _binned(where, np.where(runs.ok[chosen], runs.chattering[chosen], np.nan), edges)
+            _hatch(axes, edges, (chatters > 0.5) & ~(stopped > 0.5))
             axes.grid(visible=False)
             axes.set_xscale("log" if runs.logarithmic[x_key] else "linear")
             axes.set_yscale("log" if runs.logarithmic[y_key] else "linear")
@@ -130,6 +142,9 @@ def _map(runs: _Runs) -> Figure:
             _plain_decades(bar.ax.yaxis)
     for name, color in (("never settled", _NEVER), ("diverged", _STOPPED)):
         grid[0, 0].plot([], [], "s", color=color, label=name)
+    if runs.chattering.any():
+        style = {**_HATCH, "facecolor": "0.3"}
+        grid[0, 0].add_patch(Rectangle((np.nan, np.nan), 1, 1, label="chattering", **style))
     legend_above(figure)
     return figure
 
@@ -173,11 +188,20 @@ def _shade(axes: Axes, edges: Sequence[Floats], where: Floats, color: str) -> No
     axes.pcolormesh(*edges, where.T, cmap=ListedColormap([color]), rasterized=True)
 
 
+def _hatch(axes: Axes, edges: Sequence[Floats], where: NDArray[np.bool_]) -> None:
+    """Hatch these cells, each run of neighbours along y as one, for the lines to go through."""
+    for i, column in enumerate(where):
+        borders = np.flatnonzero(np.diff(np.concatenate([[0], column, [0]])))
+        for low, high in borders.reshape(-1, 2):
+            left, right, bottom, top = edges[0][i], edges[0][i + 1], edges[1][low], edges[1][high]
+            axes.add_patch(Rectangle((left, bottom), right - left, top - bottom, **_HATCH))
+
+
 # --- one key ---------------------------------------------------------------------------------------------
 
 
 def _curve(runs: _Runs) -> Figure:
-    """Settling time and steady-state error over one key."""
+    """Settling time and steady-state error over one key; runs that chatter are ringed."""
     metrics = ("settling_time", "steady_state_error")
     figure, grid = panels(len(metrics), len(runs.joints), width=PAGE, height=1.7)
     key = runs.keys[0]
@@ -189,11 +213,13 @@ def _curve(runs: _Runs) -> Figure:
                 order = np.argsort(runs[key][chosen])
                 line = {**LINES[g], "marker": ".", "markersize": 3}
                 axes.plot(runs[key][chosen][order], runs[column][chosen][order], label=name, **line)
+            if np.any(rings := runs.chattering):
+                axes.plot(runs[key][rings], runs[column][rings], "o", color="black", label="chattering", **_RING)
             axes.set_ylabel(runs.title(column))
             axes.set_xscale("log" if runs.logarithmic[key] else "linear")
     for axes in grid[-1]:
         axes.set_xlabel(runs.title(key))
-    if len(runs.names) > 1:
+    if len(runs.names) > 1 or runs.chattering.any():
         legend_above(figure)
     return figure
 

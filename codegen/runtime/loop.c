@@ -85,6 +85,7 @@ typedef struct {
   unsigned char alive[SL_PACK];
   sl_group p[SL_NP + 1], r[SL_NR + 1];
   sl_group x[SL_NX], u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
+  sl_group wished[SL_NJ];          /* u before its limit, which turns infinity and NaN into numbers */
   sl_group at[SL_NX], next[SL_NX]; /* where a stage is evaluated, and the next state as far as it is summed up */
   sl_time times[3];                /* the beginning, middle and end of the step */
   sl_group varying[3][SL_NV + 1];  /* what varies at these times, in turn */
@@ -136,12 +137,12 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
 static void finish_lane(sl_pack *pack, int lane, int64_t k, enum sl_status status, int quantity) {
   const sl_job *job = pack->job;
   const int64_t run = pack->run[lane];
-  const double end = half_step_time(job, 2 * k);
+  const double end = half_step_time(job, 2 * k), half = (double)(job->steps - job->steps / 2) * job->step;
   int i;
   for (i = 0; i < SL_NX; i++) job->final_state[run * SL_NX + i] = lane_of(pack->x[i], lane);
   for (i = 0; i < SL_NJ; i++) {
-    sl_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, job->start_time, end, status == SL_OK,
-                      job->metrics + run * SL_NMETRICS + i * SL_METRICS_PER_JOINT);
+    sl_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, job->start_time, end, job->step, half,
+                      status == SL_OK, job->metrics + run * SL_NMETRICS + i * SL_METRICS_PER_JOINT);
   }
   job->end_time[run] = end;
   job->status[run] = (int32_t)status;
@@ -169,19 +170,52 @@ static void stop_runaways(sl_pack *pack, int64_t k, double bound) {
   }
 }
 
+/* Whether e, sigma and the wished u are finite in all lanes, for their sum is not if one of them is not. */
+static int control_is_finite(const sl_pack *pack) {
+  const sl_v limit = slv_set(DBL_MAX);
+  sl_m finite = slv_yes();
+  int i, g;
+  for (g = 0; g < SL_G; g++) {
+    sl_v sum = slv_set(0.0);
+    for (i = 0; i < SL_NJ; i++) sum = sum + pack->e[i][g] + pack->sigma[i][g] + pack->wished[i][g];
+    finite = finite & (slv_fabs(sum) <= limit);
+  }
+  return slv_all(finite);
+}
+
+/* Ends the runs whose control is not finite at step k; they keep the state it was computed from. */
+SL_RARE void stop_overflows(sl_pack *pack, int64_t k, sl_time now) {
+  const sl_group *const computed[3] = {pack->e, pack->sigma, pack->wished};
+  int lane, bad, i;
+  for (lane = 0; lane < pack->lanes; lane++) {
+    if (!pack->alive[lane]) continue;
+    for (bad = 0; bad < 3 * SL_NJ && sl_isfinite(lane_of(computed[bad / SL_NJ][bad % SL_NJ], lane)); bad++) continue;
+    if (bad == 3 * SL_NJ) continue;
+    for (i = 0; i < SL_NJ; i++) { /* no command is applied any more: the row shows what was wished */
+      const double wished = lane_of(pack->wished[i], lane);
+      if (!sl_isfinite(wished)) set_lane(pack->u[i], lane, wished);
+    }
+    if (pack->job->output_every > 0) write_row(pack, k, now, lane, lane + 1);
+    finish_lane(pack, lane, k, SL_DIVERGED, SL_NX + SL_NJ + bad);
+  }
+}
+
 /* Metrics and trajectory at step k, where e, sigma, u belong to x. */
 static void observe(sl_pack *pack, int64_t k, sl_time now) {
   const sl_job *job = pack->job;
-  const double t = half_step_time(job, 2 * k), h = k < job->steps ? job->step : 0.0;
-  const int late = 4 * k >= 3 * job->steps;
+  const int64_t middle = job->steps / 2;
+  const sl_instant instant = {half_step_time(job, 2 * k), k == middle, k > middle, 4 * k >= 3 * job->steps};
   int i, g;
+  for (i = 0; k == 0 && i < SL_NJ; i++) {
+    for (g = 0; g < SL_G; g++) {
+      sl_metrics_start(&pack->metrics[i][g], pack->e[i][g], pack->u[i][g], pack->sigma[i][g], pack->x[SL_NJ + i][g],
+                       job->response_band, job->settling_band);
+    }
+  }
+  if (!control_is_finite(pack)) stop_overflows(pack, k, now);
   for (i = 0; i < SL_NJ; i++) {
     for (g = 0; g < SL_G; g++) {
-      if (k == 0) {
-        sl_metrics_start(&pack->metrics[i][g], pack->e[i][g], pack->u[i][g], pack->sigma[i][g], pack->x[SL_NJ + i][g],
-                         job->response_band, job->settling_band);
-      }
-      sl_metrics_sample(&pack->metrics[i][g], t, h, late, pack->e[i][g], pack->u[i][g], pack->sigma[i][g],
+      sl_metrics_sample(&pack->metrics[i][g], instant, pack->e[i][g], pack->u[i][g], pack->sigma[i][g],
                         pack->x[SL_NJ + i][g]);
     }
   }
@@ -204,11 +238,11 @@ static void stage_rk4(sl_pack *pack, int64_t k, int stage) {
   kernel_plant(pack->times[when[stage]], at, (const sl_group *)pack->u, p, r, slope);
 #else
   if (stage == 0) {
-    kernel_closed(pack->times[0], at, p, r, slope, pack->u, pack->e, pack->sigma);
+    kernel_closed(pack->times[0], at, p, r, slope, pack->u, pack->e, pack->sigma, pack->wished);
     observe(pack, k, pack->times[0]);
   } else {
-    sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
-    kernel_closed(pack->times[when[stage]], at, p, r, slope, u, e, sigma);
+    sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ], wished[SL_NJ];
+    kernel_closed(pack->times[when[stage]], at, p, r, slope, u, e, sigma, wished);
   }
 #endif
   for (i = 0; i < SL_NX; i++) {
@@ -224,7 +258,7 @@ static void stage_rk4(sl_pack *pack, int64_t k, int stage) {
 static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
   const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
   if (k % pack->job->hold == 0) {
-    kernel_control(now, x, p, r, pack->u, pack->e, pack->sigma);
+    kernel_control(now, x, p, r, pack->u, pack->e, pack->sigma, pack->wished);
   } else {
     kernel_error(now, x, p, r, pack->e, pack->sigma);
   }
@@ -238,7 +272,7 @@ static void control_at_end(sl_pack *pack, int64_t k, sl_time now) {
 #else
   sl_group slope[SL_NX];
   kernel_closed(now, (const sl_group *)pack->x, (const sl_group *)pack->p, (const sl_group *)pack->r, slope, pack->u,
-                pack->e, pack->sigma);
+                pack->e, pack->sigma, pack->wished);
   (void)k;
 #endif
 }
@@ -339,14 +373,18 @@ static void run_packs(sl_pack *packs, int count, const sl_job *job) {
 
 /* ---- entry points -------------------------------------------------------------------------------------- */
 
-/* Sizes a caller has to know: runs side by side, parameters, states, metrics, columns, tables. */
-__attribute__((visibility("default"))) void springline_layout(int64_t *layout) {
-  layout[0] = SL_PACK * SL_PACKS;
-  layout[1] = SL_NP;
-  layout[2] = SL_NX;
-  layout[3] = SL_NMETRICS;
-  layout[4] = SL_NCOLUMNS;
-  layout[5] = SL_NTABLES;
+/*
+ * How many runs go side by side, and the sizes that a caller must have the same, in the order of _LAYOUT in kernel.py: of
+ * sl_job and sl_table in bytes, of what a run takes and gives in numbers. Writes no more than `room` of them, and returns
+ * how many there are.
+ */
+__attribute__((visibility("default"))) int64_t springline_layout(int64_t *layout, int64_t room) {
+  static const int64_t sizes[] = {SL_PACK * SL_PACKS, sizeof(sl_job), sizeof(sl_table), SL_NP,       SL_NTABLES,
+                                  SL_NX,              SL_NMETRICS,    SL_NCOLUMNS,      SL_STATUSES};
+  const int64_t count = sizeof sizes / sizeof *sizes;
+  int64_t i;
+  for (i = 0; i < count && i < room; i++) layout[i] = sizes[i];
+  return count;
 }
 
 __attribute__((visibility("default"))) void springline_simulate(const sl_job *job) {

@@ -35,7 +35,7 @@ typedef struct {
   double *final_state;          /* runs x SL_NX */
   double *end_time;             /* runs, s: time of the final state */
   int32_t *status;              /* runs, enum sl_status */
-  int32_t *quantity;            /* runs, index of the state entry that left its bound, or -1 */
+  int32_t *quantity;            /* runs, what left its bound: its place in a trajectory row, t not counted, or -1 */
   double *trajectory;           /* runs x rows x SL_NCOLUMNS, or NULL; a stopped run leaves its later rows untouched */
   int64_t *rows;                /* runs, trajectory rows written, or NULL */
   int64_t capacity;             /* rows that `trajectory` has room for, per run */
@@ -45,9 +45,10 @@ typedef struct {
 
 enum sl_status {
   SL_OK = 0,
-  SL_DIVERGED = 1,      /* the state left the finite numbers */
+  SL_DIVERGED = 1,      /* the state, or what the control computed from it, left the finite numbers */
   SL_OUT_OF_BOUNDS = 2, /* the state left the bound of the job */
-  SL_STOPPED = 3        /* the caller asked to stop */
+  SL_STOPPED = 3,       /* the caller asked to stop */
+  SL_STATUSES
 };
 
 #endif

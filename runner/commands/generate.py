@@ -55,6 +55,7 @@ def _command(name: str, description: str, default: Any = ...) -> Callable[..., N
     ) -> None:
         from springline.codegen.api import generate_files
         from springline.codegen.export import bind
+        from springline.codegen.vectors import Overflow
         from springline.runner.scenario import load_scenario
 
         refuse_files(output)
@@ -62,9 +63,11 @@ def _command(name: str, description: str, default: Any = ...) -> Callable[..., N
         names = tunable_names(tunable)
         try:
             export = bind(loaded.structure(), loaded.values(), tunable=names, prefix=prefix, real=real.value)
-        except ValueError as error:  # the scenario's numbers are in their bounds, so this is --tunable or --prefix
+            files, manifest = generate_files(export)
+        except Overflow as error:
+            raise InputError(Problem(scenario, error.key, str(error), repr(error.value))) from error
+        except ValueError as error:  # the scenario's numbers are in their bounds: --tunable, --prefix or --real
             raise InputError(Problem(f"springline {name}", "", str(error))) from error
-        files, manifest = generate_files(export)
         if check:
             _report_check(name, output, check_tree(output, files, manifest), len(files), as_json)
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -23,6 +24,9 @@ OUTPUTS = (
     "figures/*.svg",
 )
 """What a run leaves in its folder, as glob patterns."""
+
+
+_TEXT_SIZE = 2.5  # a number as text, by the size of a double
 
 
 class Engine(StrEnum):
@@ -73,6 +77,7 @@ def run(
     folder = output or Path("results", scenario if packaged else Path(scenario).stem)
     refuse_occupied(folder, force=force)
     _refuse_own_inputs(folder, scenario, loaded)
+    _refuse_too_large(folder, loaded, form)
     with progress(f"simulating {scenario}", quiet=as_json) as report:
         result = simulate(loaded, engine=engine.value, progress=report)
     files = {"scenario.toml": loaded.to_toml().encode()}
@@ -85,8 +90,8 @@ def run(
         print_json("run", result.metrics.to_pylist(), units(result.metrics), result.status)
         return
     print_metrics(result, loaded.system().joints)
-    say(result.message)
     say(f"results: {folder}")
+    say(result.message)
 
 
 def refuse_occupied(folder: Path, *, force: bool) -> None:
@@ -117,6 +122,17 @@ def _refuse_own_inputs(folder: Path, source: str, scenario: Scenario) -> None:
                 "is what the run reads, and its results would take its place: choose another folder with -o",
             )
         )
+
+
+def _refuse_too_large(folder: Path, scenario: Scenario, form: Format) -> None:
+    """Raise InputError if the trajectory does not fit memory or the disk of `folder`; all else is small."""
+    from springline.runner.simulate import refuse_large, refuse_rows, row_size
+
+    refuse_large(scenario)
+    place = next(place for place in (folder, *folder.resolve().parents) if place.exists())
+    free = shutil.disk_usage(place).free
+    row = row_size(scenario) if form is Format.parquet else round(_TEXT_SIZE * row_size(scenario))
+    refuse_rows(scenario, free // row, f"all that {free / 1e9:.3g} GB of free disk space at {place} have room for")
 
 
 def print_metrics(result: Result, joints: tuple[Joint, ...]) -> None:

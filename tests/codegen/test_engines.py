@@ -291,3 +291,39 @@ def test_signals_of_its_own_make_a_run_compute_them(shaken: Program, values_of: 
     sizes = lanes.emit(shaken, baked, 1).sizes
     assert sizes["uniform"] > 5
     assert 0 < sizes["varying"] < 8
+
+
+def test_constants_keep_the_signs_of_their_zeros(shaken: Program, values_of: Values) -> None:
+    """What is folded when the lanes are printed, what C computes, and what CasADi prints: the same zeros.
+
+    fmin(a, b) is a < b ? a : b, and fmax likewise; a sign becomes a rate of -1 or 1.
+    """
+    keys = [slot.key for slot in shaken.system.slots]
+    minus, plus = keys.index("initial.dq.0"), keys.index("initial.dq.1")
+    old = shaken.functions["plant"]
+    inputs = old.sx_in()
+    p = inputs[4]
+    zeros = [
+        (ca.sign(p[minus]), -1.0),
+        (ca.sign(p[plus]), 1.0),
+        (ca.fmin(p[plus], p[minus]), -1.0),
+        (ca.fmin(p[minus], p[plus]), 1.0),
+        (ca.fmax(p[plus], p[minus]), -1.0),
+        (ca.fmax(p[minus], p[plus]), 1.0),
+        (-p[plus], -1.0),
+        (p[minus] + p[minus], -1.0),
+    ]
+    with as_written():
+        slope = ca.vertcat(*(ca.copysign(ca.SX(1.0), zero) for zero, _ in zeros))
+        plant = ca.Function(old.name(), inputs, [slope], [old.name_in(i) for i in range(old.n_in())], ["dx"])
+    signs = Program(shaken.system, {**shaken.functions, "plant": plant})
+    table = values_of(shaken, {"initial.dq.0": -0.0, "initial.dq.1": 0.0, "initial.q.0": 0.0, "initial.q.1": 0.0})[None]
+    for options in (
+        KernelOptions(engine="casadi", flags=("-O1",)),
+        KernelOptions(width=2, flags=("-O1",)),
+        KernelOptions(width=1, tunable=(), flags=("-O1",)),
+        KernelOptions(width=2, tunable=(), flags=("-O1",)),
+        KernelOptions(width=2, tunable=("initial.dq.1",), flags=("-O1",)),
+    ):
+        state = run(signs, table, options, settings=LoopSettings(steps=1, step=1.0)).final_state[0]
+        assert np.round(state).tolist() == [sign for _, sign in zeros], options

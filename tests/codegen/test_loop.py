@@ -1,5 +1,6 @@
 """The compiled loop: order, accuracy, sampling, signals, metrics, divergence, threads."""
 
+import ctypes
 import math
 import threading
 from collections.abc import Callable
@@ -10,8 +11,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen import toolchain
-from springline.codegen.kernel import METRICS, Control, KernelOptions, LoopSettings, Runs, Table, compile_kernel
+from springline.codegen import kernel as kernel_module
+from springline.codegen import kernel_source, toolchain
+from springline.codegen.kernel import (
+    METRICS,
+    MOST_STEPS,
+    STATUS,
+    Control,
+    KernelOptions,
+    LayoutError,
+    LoopSettings,
+    Runs,
+    Table,
+    compile_kernel,
+    quantity_name,
+)
 from springline.codegen.program import Program, program
 from springline.model.linear import as_written
 from springline.model.system import SignalShape, Structure
@@ -72,7 +86,7 @@ def test_closed_loop_agrees_with_cvodes(values_of: Values) -> None:
     system = still.system
     t, x = ca.SX.sym("t"), ca.SX.sym("x", 8)
     w = system.function("signals")(t, ca.SX(0, 1), values)
-    u, _, _ = system.function("loop_control")(w, x, values)
+    u, *_ = system.function("loop_control")(w, x, values)
     ode = system.function("loop_plant")(w, x, u, values)
     times = np.linspace(0.0, 4.0, 9)
     cvodes = ca.integrator(
@@ -101,13 +115,17 @@ def metrics_by_hand(rows: NDArray[np.float64], joint: int, settings: LoopSetting
     inside = np.flatnonzero(size <= settings.response_band * start)
     outside = np.flatnonzero(size > settings.settling_band * start)
     last = outside[-1]
+    second = u[settings.steps // 2 :]
+    half = (settings.steps - settings.steps // 2) * settings.step
+    scale = max(second.max() - second.min(), 1e-3 * np.abs(u).max())
     return {
         "response_time": t[inside[0]],
         "settling_time": t[last] if t[last] <= 0.98 * t[-1] else math.nan,
         "overshoot": max(0.0, (-e * np.sign(e[0])).max()),
         "steady_state_error": size[late].max(),
-        "iae": size[:-1].sum() * settings.step,
+        "iae": np.trapezoid(size, t),
         "U_max": np.abs(u).max(),
+        "chatter": np.abs(np.diff(second)).sum() / half / scale,
         "U_tv": np.abs(np.diff(u[last:])).sum(),
         "sigma_tv": np.abs(np.diff(sigma[last:])).sum(),
         "dq1_tv": np.abs(np.diff(rate[last:])).sum(),
@@ -115,14 +133,101 @@ def metrics_by_hand(rows: NDArray[np.float64], joint: int, settings: LoopSetting
 
 
 @pytest.mark.parametrize("sampled", [False, True])
-def test_metrics_follow_their_definitions(sampled: bool, shaken: Program, values_of: Values) -> None:
-    settings = LoopSettings(8000, 1e-4, hold=4, output_every=1)
+@pytest.mark.parametrize("steps", [8000, 8001])
+def test_metrics_follow_their_definitions(steps: int, sampled: bool, shaken: Program, values_of: Values) -> None:
+    settings = LoopSettings(steps, 1e-4, hold=4, output_every=1)
     result = run(shaken, values_of(shaken), settings, sampled=sampled)
     assert result.trajectory is not None
     for joint in range(2):
         expected = metrics_by_hand(result.trajectory[0], joint, settings)
         for k, name in enumerate(METRICS):
             assert result.metrics[0, joint, k] == pytest.approx(expected[name], rel=1e-9), name
+
+
+def motion(base: Program, accelerations: Callable[[ca.SX, ca.SX], ca.SX]) -> Program:
+    """The loop around motors at rest and links that move as the 2 x 1 `accelerations`(q1, dq1) say."""
+    return with_plant(base, lambda x: ca.vertcat(x[2:4], accelerations(x[:2], x[2:4]), ca.SX.zeros(4)))
+
+
+STILL = {f"reference.{key}": 0.0 for key in ("lift.terms.0.amplitude", "rotation.terms.0.amplitude", "rotation.offset")}
+
+
+@pytest.mark.parametrize("start", [0.0, 30.0])
+def test_a_run_has_settled_if_it_did_before_its_last_fiftieth(start: float, shaken: Program, values_of: Values) -> None:
+    """e decays to its band of 5 % at 97.5 % of the run on the lift, at 98.5 % on the rotation."""
+    duration, shares = 2.0, (0.975, 0.985)
+    rates = ca.DM([math.log(20.0) / (share * duration) for share in shares])
+    decaying = with_plant(shaken, lambda x: ca.vertcat(-rates * x[:2], ca.SX.zeros(6)))
+    settings = LoopSettings(2000, duration / 2000, start_time=start)
+    result = run(decaying, values_of(shaken, STILL), settings)
+    lift, rotation = (dict(zip(METRICS, result.metrics[0, j], strict=True)) for j in range(2))
+    assert lift["settling_time"] == pytest.approx(start + shares[0] * duration, abs=2 * settings.step)
+    assert lift["dq1_tv"] == 0.0
+    assert all(math.isnan(rotation[name]) for name in ("settling_time", "U_tv", "sigma_tv", "dq1_tv"))
+    assert rotation["response_time"] == pytest.approx(
+        start + shares[1] * duration * math.log(10.0) / math.log(20.0), abs=2 * settings.step
+    )
+
+
+def test_variation_counts_from_the_last_time_outside_the_band(shaken: Program, values_of: Values) -> None:
+    """Of damped swings that leave the band again and again, the last departure is what settling ends with."""
+    swinging = motion(shaken, lambda q, dq: -(ca.DM([20.0, 14.0]) ** 2) * q - ca.DM([3.0, 2.0]) * dq)
+    settings = LoopSettings(40_000, 1e-4, output_every=1)
+    result = run(swinging, values_of(shaken, STILL), settings)
+    assert result.trajectory is not None
+    for joint in range(2):
+        rows = result.trajectory[0]
+        outside = np.abs(rows[:, 11 + joint]) > settings.settling_band * abs(rows[0, 11 + joint])
+        assert np.count_nonzero(np.diff(outside.astype(int)) == 1) > 5, "it leaves the band again"
+        expected = metrics_by_hand(rows, joint, settings)
+        assert expected["sigma_tv"] < 0.2 * np.abs(np.diff(rows[:, 13 + joint])).sum()
+        for name in ("settling_time", "U_tv", "sigma_tv", "dq1_tv"):
+            assert result.metrics[0, joint, METRICS.index(name)] == pytest.approx(expected[name], rel=1e-9), name
+
+
+def test_chatter_is_the_rate_of_full_swings(shaken: Program, values_of: Values) -> None:
+    """A command that swings f times a second from end to end and back has 2 f; one that stands still has 0.
+
+    The lift's motor swings by itself; K_f makes that the command, against which the rest of it is nothing.
+    """
+    swings = 13.0
+    w = 2.0 * math.pi * swings
+    values = values_of(shaken, {**STILL, "initial.dq.0": 0.0, "control.K_f.0": 1e9, "control.K_f.1": 0.0})
+    swinging = with_plant(shaken, lambda x: ca.vertcat(ca.SX.zeros(4), w * x[6], ca.SX(0), -w * x[4], ca.SX(0)))
+    result = run(swinging, values, LoopSettings(20_000, 1e-4))
+    lift, rotation = result.metrics[0, :, METRICS.index("chatter")]
+    assert lift == pytest.approx(2.0 * swings, rel=2e-3)
+    assert rotation == 0.0
+
+
+def test_ripple_far_below_the_largest_command_is_no_chatter(shaken: Program, values_of: Values) -> None:
+    """Swings of 30 Hz that are damped to 6e-6 of their size when the second half begins."""
+    w, damping = 2.0 * math.pi * 30.0, 12.0
+    values = values_of(shaken, {**STILL, "initial.dq.0": 0.0, "control.K_f.0": 1e9, "control.K_f.1": 0.0})
+    damped = with_plant(
+        shaken,
+        lambda x: ca.vertcat(ca.SX.zeros(4), w * x[6] - damping * x[4], ca.SX(0), -w * x[4] - damping * x[6], ca.SX(0)),
+    )
+    settings = LoopSettings(20_000, 1e-4, output_every=1)
+    result = run(damped, values, settings)
+    assert result.trajectory is not None
+    chatter = result.metrics[0, 0, METRICS.index("chatter")]
+    u = result.trajectory[0, :, 15]
+    assert np.ptp(u[10_000:]) < 1e-4 * np.abs(u).max()
+    assert chatter == pytest.approx(np.abs(np.diff(u[10_000:])).sum() / 1.0 / (1e-3 * np.abs(u).max()), rel=1e-9)
+    assert chatter < 1.0
+
+
+def test_iae_of_a_run_that_stops_ends_where_it_does(shaken: Program, values_of: Values) -> None:
+    """e grows at 3 m/s, so that its integral up to t is known; a step has a quarter of it."""
+    values = values_of(shaken, {**STILL, "initial.q.0": 1.0})
+    growing = with_plant(shaken, lambda x: ca.vertcat(ca.SX(3.0), ca.SX.zeros(7)))
+    result = run(growing, values, LoopSettings(100, 0.1, bound=2.4))
+    assert STATUS[result.status[0]] == "out_of_bounds"
+    end = result.end_time[0]
+    assert end == pytest.approx(0.4)
+    assert result.metrics[0, 0, METRICS.index("iae")] == pytest.approx(end + 3.0 * end**2 / 2, rel=1e-12)
+    assert math.isnan(result.metrics[0, 0, METRICS.index("chatter")])
 
 
 def test_metrics_that_do_not_exist_are_nan(shaken: Program, values_of: Values) -> None:
@@ -192,6 +297,96 @@ def test_not_a_number_is_divergence(shaken: Program, values_of: Values) -> None:
     assert result.status[0] == 1
     assert result.end_time[0] == 0.0
     assert np.isfinite(result.final_state).all()
+
+
+OVERFLOWS = {
+    "sigma_lift": {"reference.lift.terms.0.phase": 1.0, "reference.lift.terms.0.amplitude": 1e160},
+    "sigma_rotation": {"reference.rotation.offset": -1e120},
+    "e_rotation": {"reference.rotation.offset": 1.7e308, "initial.q.1": -1.7e308},
+    "U_lift": {"control.K_f.0": 1e305, "initial.dq.0": -1e5},
+    "U_rotation": {"mechanism.L3": 1e300},
+}
+LIMITS = {"control.U_max.0": 500.0, "control.U_max.1": 100.0}
+
+
+@pytest.mark.parametrize("limits", [{}, LIMITS], ids=["no limit", "U_max"])
+@pytest.mark.parametrize("sampled", [False, True])
+@pytest.mark.parametrize(
+    "options",
+    [PLAIN, KernelOptions(width=4, groups=2), KernelOptions(width=2, groups=1, packs=2), KernelOptions("casadi")],
+    ids=["scalar", "W4G2", "W2P2", "casadi"],
+)
+def test_control_that_overflows_ends_the_run_and_is_named(
+    options: KernelOptions, sampled: bool, limits: dict[str, float], shaken: Program, values_of: Values
+) -> None:
+    """Whether or not U_max turns the command into a number; the runs beside it have the bits that they have alone."""
+    sound = values_of(shaken, limits)
+    values = np.stack([item for case in OVERFLOWS.values() for item in (values_of(shaken, {**limits, **case}), sound)])
+    settings = LoopSettings(40, 1e-4, hold=3, output_every=7, bound=math.inf)
+    kernel = compile_kernel(shaken, sampled, options)
+    result = kernel.run(values, settings)
+    names = [quantity_name(shaken.system.joints, quantity) for quantity in result.quantity[::2]]
+    assert names == list(OVERFLOWS)
+    assert {STATUS[status] for status in result.status[::2]} == {"diverged"}
+    assert (result.end_time[::2] == 0.0).all()
+    assert np.isfinite(result.final_state).all()
+    assert np.isnan(result.metrics[::2]).all(), "there was not one sample to judge"
+    assert result.trajectory is not None and result.rows is not None
+    assert (result.rows[::2] == 1).all()
+    for row, name in zip(result.trajectory[::2, 0], names, strict=True):
+        place = shaken.system.n * ["q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U"].index(name.partition("_")[0])
+        assert not np.isfinite(row[1 + place : 1 + place + 2]).all(), "the row shows what it was"
+    alone = kernel.run(sound[None], settings)
+    assert STATUS[alone.status[0]] == "ok"
+    for run_beside in range(1, len(values), 2):
+        assert result.final_state[run_beside].tobytes() == alone.final_state[0].tobytes()
+        assert result.metrics[run_beside].tobytes() == alone.metrics[0].tobytes()
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+@pytest.mark.parametrize(
+    "options", [PLAIN, KernelOptions(width=4, groups=2), KernelOptions("casadi")], ids=["scalar", "lanes", "casadi"]
+)
+def test_control_that_overflows_later_ends_the_run_there(
+    options: KernelOptions, sampled: bool, values_of: Values
+) -> None:
+    """The reference jumps to 1e120, whose cube is none; up to there the run is that of a shorter one."""
+    tabled = program(Structure(reference=SignalShape("table", (1, 0))))
+    pieces = np.zeros((4, 1, 4))
+    pieces[2:, 0, 0] = 1e120
+    tables = (Table(0.0, 0.01, False, pieces),)
+    values = values_of(tabled, LIMITS)
+    settings = LoopSettings(400, 1e-4, hold=8, output_every=1)
+    result = run(tabled, values, settings, sampled=sampled, tables=tables, options=options)
+    assert STATUS[result.status[0]] == "diverged"
+    assert quantity_name(tabled.system.joints, int(result.quantity[0])) == "sigma_lift"
+    assert result.end_time[0] == 0.02
+    before = run(tabled, values, LoopSettings(199, 1e-4, hold=8), sampled=sampled, tables=tables, options=options)
+    assert result.trajectory is not None and result.rows is not None
+    assert result.rows[0] == 201
+    assert result.trajectory[0, 199, 1:9].tobytes() == before.final_state[0].tobytes()
+    assert np.isfinite(result.trajectory[0, :200]).all()
+    assert np.isinf(result.trajectory[0, 200, 13])
+    for name in ("iae", "U_max"):
+        k = METRICS.index(name)
+        assert result.metrics[0, 0, k] == before.metrics[0, 0, k], "nothing beyond the last sound sample counts"
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_control_that_overflows_at_the_end_is_told_too(sampled: bool, values_of: Values) -> None:
+    tabled = program(Structure(reference=SignalShape("table", (1, 0))))
+    pieces = np.zeros((2, 1, 4))
+    pieces[1, 0, 0] = -1e130
+    result = run(
+        tabled,
+        values_of(tabled, LIMITS),
+        LoopSettings(100, 1e-4, hold=50),
+        sampled=sampled,
+        tables=(Table(0.0, 0.01, False, pieces),),
+    )
+    assert STATUS[result.status[0]] == "diverged"
+    assert result.end_time[0] == 0.01
+    assert np.isnan(result.metrics[0, :, METRICS.index("settling_time")]).all()
 
 
 def parabola(rate: float, knots: int, dt: float, **options: object) -> Table:
@@ -297,3 +492,94 @@ def test_wrong_shapes_are_refused(shaken: Program, values_of: Values) -> None:
         kernel.run(np.zeros((2, 3)), LoopSettings(1, 1e-3))
     with pytest.raises(ValueError, match="the system has 0"):
         kernel.run(values_of(shaken)[None, :], LoopSettings(1, 1e-3), [parabola(1.0, 3, 0.1)])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"steps": -1}, "steps is -1, expected a whole number from 0"),
+        ({"steps": MOST_STEPS + 1}, f"steps is {MOST_STEPS + 1}, expected a whole number from 0 to {MOST_STEPS}"),
+        ({"steps": 10**4000}, "steps is an integer of 13288 bits"),
+        ({"steps": 4.0}, "steps is 4.0, expected a whole number"),
+        ({"steps": True}, "steps is True"),
+        ({"hold": 0}, "hold is 0, expected a whole number from 1"),
+        ({"hold": 2**64}, f"hold is {2**64}"),
+        ({"hold": np.uint64(2**63)}, "hold is "),
+        ({"output_every": 2**63}, f"output_every is {2**63}"),
+        ({"output_every": -1}, "output_every is -1"),
+        ({"step": 0.0}, "step is 0.0, expected a positive number"),
+        ({"step": math.nan}, "step is nan"),
+        ({"step": "1 ms"}, "step is '1 ms'"),
+        ({"step": 10**400}, "step is an integer"),
+        ({"bound": math.nan}, "bound is nan, expected a positive number or inf"),
+        ({"response_band": math.inf}, "response_band is inf"),
+        ({"settling_band": None}, "settling_band is None"),
+        ({"start_time": math.inf}, "start_time is inf"),
+        ({"steps": 2**40, "step": 1e300}, "start_time \\+ steps \\* step, is inf"),
+    ],
+)
+def test_numbers_that_the_loop_cannot_count_with_are_refused(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(LoopSettings(10, 1e-3), **changes)
+
+
+def test_integers_of_numpy_are_taken_as_they_are(shaken: Program, values_of: Values) -> None:
+    settings = LoopSettings(np.uint16(300), np.float32(0.0625), hold=np.int8(3), output_every=np.uint64(100))
+    assert settings == LoopSettings(300, 0.0625, hold=3, output_every=100)
+    assert run(shaken, values_of(shaken), replace(settings, step=1e-5)).rows == 4
+
+
+@pytest.mark.parametrize(
+    ("t0", "dt", "shape"),
+    [(0.0, 0.0, (3, 1, 4)), (math.nan, 0.1, (3, 1, 4)), (0.0, math.inf, (3, 1, 4)), (0.0, 0.1, (0, 1, 4))],
+)
+def test_tables_without_an_interval_to_look_up_are_refused(t0: float, dt: float, shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match="of a table"):
+        Table(t0, dt, False, np.zeros(shape))
+
+
+def test_c_structures_take_no_number_that_they_would_change() -> None:
+    """What ctypes cuts off without a word."""
+    job = {name: None if kind is ctypes.c_void_p else 0 for name, kind in kernel_module._Job._fields_}
+    kernel_module._Job(**job)
+    for name, value in (("steps", 2**64), ("last", 2**63), ("output_every", -(2**64) + 5), ("capacity", 2**80)):
+        with pytest.raises(ValueError, match=f"{name} is .*, which C would take for"):
+            kernel_module._Job(**{**job, name: value})
+    with pytest.raises(TypeError, match="has no stepps"):
+        kernel_module._Job(**job, stepps=3)
+
+
+def test_results_beyond_the_memory_are_refused_before_it_is_asked_for(
+    shaken: Program, values_of: Values, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kernel = compile_kernel(shaken, False, PLAIN)
+    values = values_of(shaken)[None, :]
+    with pytest.raises(ValueError, match=r"output_every is 1: 1 x 4398046511105 trajectory rows .* need 7.04e\+05 GB"):
+        kernel.run(values, LoopSettings(2**42, 1e-12, output_every=1))
+    monkeypatch.setattr(kernel_module, "memory", lambda: 8 * 20 * 100)
+    assert kernel.run(values, LoopSettings(99, 1e-6, output_every=1)).rows == 100
+    with pytest.raises(ValueError, match="101 trajectory rows"):
+        kernel.run(values, LoopSettings(100, 1e-6, output_every=1))
+
+
+def test_a_metric_that_only_one_side_knows_is_an_error(shaken: Program, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(kernel_module, "METRICS", (*METRICS, "jerk"))
+        with pytest.raises(LayoutError, match="metrics: 20, expected 22"):
+            compile_kernel(shaken, False, PLAIN)
+    sources = dict(kernel_source.runtime_sources())
+    sources["metrics.h"] = sources["metrics.h"].replace("  SL_DQ1_TV,\n", "  SL_DQ1_TV,\n  SL_JERK,\n")
+    with monkeypatch.context() as patch:
+        patch.setattr(kernel_source, "runtime_sources", lambda: sources)
+        with pytest.raises(LayoutError, match="metrics: 22, expected 20"):
+            compile_kernel(shaken, False, PLAIN)
+
+
+def test_a_job_of_another_size_is_an_error(shaken: Program, monkeypatch: pytest.MonkeyPatch) -> None:
+    sources = dict(kernel_source.runtime_sources())
+    sources["simulate.h"] = sources["simulate.h"].replace(
+        "  int64_t capacity; ", "  int64_t seed;\n  int64_t capacity; "
+    )
+    monkeypatch.setattr(kernel_source, "runtime_sources", lambda: sources)
+    with pytest.raises(LayoutError, match="bytes of a job: 184, expected 176"):
+        compile_kernel(shaken, False, PLAIN)

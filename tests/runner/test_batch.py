@@ -39,7 +39,7 @@ from springline.runner.quantiles import Quantiles
 from springline.runner.replay import stored_plan
 from springline.runner.summary import QUANTILES, summarize
 from springline.runner.sweep import load_sweep, packaged_sweeps
-from springline.runner.sweep_plots import rank_correlation
+from springline.runner.sweep_plots import rank_correlation, summary_figures
 from springline.runner.work import parcel, perform_parcel
 
 # Steps that cost next to nothing; one kernel for most tests of this file and of test_dataset.py.
@@ -343,7 +343,8 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_resume(
     assert f"springline batch {sweep} -o {folder} --resume" in done.stderr.replace("\n", " ")
     again = command("batch", sweep, "-o", folder, "--resume", "--no-plot", "--json")
     assert again.exit_code == 0
-    assert json.loads(again.stdout)["rows"] == [{"group": "all", "ok": 2000, "diverged": 0, "out_of_bounds": 0}]
+    expected = {"group": "all", "ok": 2000, "diverged": 0, "out_of_bounds": 0, "chattering": 0}
+    assert json.loads(again.stdout)["rows"] == [expected]
 
 
 # --- the commands ----------------------------------------------------------------------------------------
@@ -491,6 +492,53 @@ def test_summary_numbers_are_those_of_the_table(tmp_path: Path) -> None:
     assert found.metrics["steady_state_error_lift"].missing == pytest.approx(missing)
     first = np.sort(table["t_end"].to_numpy()[status != "ok"])[: len(found.worst)]
     assert [row["t_end"] for row in found.worst][: len(first)] == list(first)
+
+
+@pytest.mark.parametrize("keys", [1, 2])
+def test_chattering_runs_are_counted_and_marked(keys: int, tmp_path: Path, command: Command) -> None:
+    """Narrow boundary layers chatter, wide ones do not, and without fast control nothing is left to chatter."""
+    second = "control.k1 = { values = [2.0, 3.0] }" if keys == 2 else ""
+    file = tmp_path / "sweep.toml"
+    file.write_text(
+        f"""
+        scenario = "paper/nominal"
+        method = "grid"
+        [set]
+        simulation.duration = 1.2
+        [vary]
+        control.fast = {{ values = [true, false] }}
+        control.delta = {{ values = [0.01, 0.015, 0.05, 0.08] }}
+        {second}
+        """
+    )
+    done = command("batch", file, "-o", tmp_path / "data", "--no-plot")
+    assert done.exit_code == 0, done.stderr
+    dataset = Dataset(place(tmp_path / "data"))
+    plan, table = stored_plan(dataset), read_dataset(tmp_path / "data").to_pylist()
+    summary = summarize(plan, dataset)
+    chatter = [
+        any(row[f"chatter_{joint}"] is not None and row[f"chatter_{joint}"] > 20.0 for joint in ("lift", "rotation"))
+        for row in table
+    ]
+    assert [row["control.delta"] < 0.02 and row["status"] == "ok" for row in table] == chatter
+    counts = {"ok": 4 * keys, "chattering": 2 * keys, "diverged": 0, "out_of_bounds": 0}
+    assert summary.outcomes["fast = true"] == counts
+    assert summary.outcomes["fast = false"]["chattering"] == 0
+    assert summary.stopped == 4 * keys
+    assert re.search(rf"fast = true +{4 * keys} +{4 * keys} +{2 * keys} ", done.stdout)
+    text = (tmp_path / "data" / "summary.md").read_text()
+    assert f"| fast = true | {4 * keys} | {4 * keys} | {2 * keys} | 0 | 0 |" in text
+    figures = summary_figures(plan, summary)
+    if keys == 1:
+        rings = [line for axes in figures["curve"].axes for line in axes.lines if line.get_label() == "chattering"]
+        assert [len(line.get_xdata()) for line in rings] == [2] * 4
+    else:
+        hatched = [
+            [patch.get_bbox() for patch in axes.patches if patch.get_hatch() and patch.get_label() != "chattering"]
+            for axes in figures["map"].axes
+        ]
+        assert [len(boxes) for boxes in hatched] == [2, 2, 0, 0, 0], "two columns, each of two cells, in the upper maps"
+        assert all(box.x1 < 0.05 for boxes in hatched for box in boxes)
 
 
 def test_quantiles_are_exact_whatever_the_sample_that_figures_show(

@@ -572,5 +572,5 @@ def test_a_trajectory_beyond_memory_is_refused(elsewhere: Path) -> None:
     """The remedy names the key and a value that works."""
     message = refused("run", "paper/nominal", "--set", "simulation.duration=1e5", "-o", "out", code=2)
     assert "simulation.output_every" in message
-    assert "expected at least 100" in message
+    assert "expected at least 101" in message
     assert not Path("out").exists()
