@@ -81,14 +81,14 @@ def run(
     files |= table_files("trajectory", result.trajectory, form.value)
     files |= table_files("metrics", result.metrics, form.value)
     write_folder(folder, files, replaces=OUTPUTS)
-    for note in loaded.notes:
-        complain(note)
     if as_json:
         print_json("run", result.metrics.to_pylist(), units(result.metrics), result.status)
-        return
-    print_metrics(result, loaded.system().joints)
-    say(result.message)
-    say(f"results: {folder}")
+    else:
+        print_metrics(result, loaded.system().joints)
+        say(result.message)
+        say(f"results: {folder}")
+    for note in loaded.notes:
+        complain(note)
 
 
 def refuse_occupied(folder: Path, *, force: bool) -> None:
