@@ -14,7 +14,7 @@ from springline.model.system import Structure
 from springline.runner import schema
 from springline.runner.errors import InputError, Problem, unknown
 from springline.runner.locate import canonical_path, read_signal_file
-from springline.runner.tables import UNITS, Column, Ends, Table, read_table
+from springline.runner.tables import HALF_TURN, UNITS, Column, Ends, Table, read_table
 
 Document = dict[str, dict[str, Any]]
 
@@ -22,8 +22,8 @@ Document = dict[str, dict[str, Any]]
 _WHOLE = 1e-9
 
 
-def resolve(raw: Mapping[str, object], where: str, folder: Path) -> tuple[Document, tuple[Table, ...]]:
-    """A document with every default filled in, and its signal tables.
+def resolve(raw: Mapping[str, object], where: str, folder: Path) -> tuple[Document, tuple[Table, ...], tuple[str, ...]]:
+    """A document with every default filled in, its signal tables, and notes on what was made of them.
 
     where   what the document came from, for messages
     folder  what relative paths refer to
@@ -67,20 +67,24 @@ def resolve(raw: Mapping[str, object], where: str, folder: Path) -> tuple[Docume
     problems += _exponent_problems(document["control"], where)
     problems += _sampling_problems(document, given["control"], where)
     problems += _whole_problems(document, "simulation.duration", where)
-    duration = document["simulation"].get("duration", 0.0)
+    duration = document["simulation"].get("duration")
     units = {
         "reference": {joint.name: joint.unit for joint in MECHANISMS[mechanism].joints},
         "base_motion": {c.key: c.unit for c in COORDINATES},
     }
-    tables = []
+    tables: list[Table] = []
+    notes: list[str] = []
     for name in with_table:
         try:
-            tables.append(_load_table(document[name], name, units[name], duration, folder, where))
+            table, remarks = _load_table(document[name], name, units[name], folder, where)
+            tables.append(table)
+            if duration is not None:
+                notes += [*remarks, _expect_overlap(table, document[name], name, duration, where)]
         except InputError as error:
             problems += error.problems
     if problems:
         raise InputError(*problems)
-    return document, tuple(tables)
+    return document, tuple(tables), tuple(notes)
 
 
 def _section_of_kind(
@@ -155,9 +159,12 @@ def _whole_problems(document: Document, key: str, where: str) -> list[Problem]:
 
 
 def _load_table(
-    table: dict[str, Any], name: str, units: Mapping[str, str], duration: float, folder: Path, where: str
-) -> Table:
-    """The signal table that [reference] or [base_motion] asks for; makes path and units in `table` explicit."""
+    table: dict[str, Any], name: str, units: Mapping[str, str], folder: Path, where: str
+) -> tuple[Table, list[str]]:
+    """The signal table that [reference] or [base_motion] asks for, with notes on it.
+
+    Makes path and units in `table` explicit.
+    """
     columns, chosen = table["columns"], table["units"]
     si = {"t": "s", **units}
     problems = [
@@ -171,17 +178,45 @@ def _load_table(
     if problems:
         raise InputError(*problems)
     table["units"] = chosen = {key: chosen.get(key, si[key]) for key in si if key in columns}
-    table["path"] = path = canonical_path(table["path"], folder)
-    wanted = [
-        Column(columns[key], f"{name}.columns.{key}", UNITS.get(si[key], {}).get(unit, 1.0))
-        for key, unit in chosen.items()
-    ]
     key = f"{name}.path"
-    data = read_signal_file(path, where, key)
-    read = read_table(data, path, wanted[0], wanted[1:], cast(Ends, table["ends"]), where=where, key=key)
-    if not read.covers(duration):
-        text = (
-            f'{path} lasts from {read.t0:g} to {read.end:g} s: expected all of 0 to {duration:g} s with ends = "error"'
+    table["path"] = path = canonical_path(table["path"], folder, where, key)
+    time, *channels = (
+        Column(
+            columns[item],
+            f"{name}.columns.{item}",
+            UNITS.get(si[item], {}).get(unit, 1.0),
+            HALF_TURN.get(unit, math.inf),
         )
-        raise InputError(Problem(where, f"{name}.ends", text))
-    return read
+        for item, unit in chosen.items()
+    )
+    data = read_signal_file(path, where, key)
+    ends = cast(Ends, table["ends"])
+    return read_table(data, path, time, channels, ends, t0=table["t0"], where=where, key=key)
+
+
+def _expect_overlap(read: Table, table: Mapping[str, Any], name: str, duration: float, where: str) -> str:
+    """A note on the span of the record that a run of `duration` s uses. Raises InputError if there is none."""
+    t0, path = table["t0"], table["path"]
+    lasts = f"{path} lasts from {read.t0 + t0:.15g} to {read.end + t0:.15g} s"
+    wanted = f"{t0:.15g} to {t0 + duration:.15g} s"
+    if read.ends == "periodic":
+        return f"{name}: {path} repeats every {read.end - read.t0:.15g} s, and the run begins at its {t0:.15g} s"
+    if not read.touches(duration):
+        text = (
+            f"{lasts} and the run takes {wanted} of it, which is outside: expected the record's time at run time 0 "
+            f"(t0 = {read.t0 + t0:.15g} starts the run with the record; units.t says what its times are in)"
+        )
+        raise InputError(Problem(where, f"{name}.t0", text, f"{t0!r} s"))
+    if not read.covers(duration):
+        raise InputError(Problem(where, f"{name}.ends", f'{lasts}: expected all of {wanted} with ends = "error"'))
+    note = f"{name}: {lasts}, and the run takes {wanted} of it"
+    early, late = read.t0 > read.dt * _WHOLE, read.end < duration - read.dt * _WHOLE
+    if early or late:
+        before, after = (read.dt * (len(intervals) - 1) for intervals in read.rests())
+        if early:
+            note += f"; before the record the motion starts from rest at its first value, {before:.4g} s earlier"
+        if late:
+            note += f"; after the record the motion comes to rest at its last value, {after:.4g} s later"
+    if duration < read.dt:
+        note += f": less than one of its sample intervals of {read.dt:.15g} s (is units.t right?)"
+    return note

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import stat
 from collections.abc import Iterator
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -11,6 +14,10 @@ from springline.runner.errors import InputError, Problem, unknown
 
 PACKAGED = "springline:"
 """A path that begins so is that of a file beside the packaged scenarios: "springline:data/vessel_orcaflex_10hz.csv"."""
+
+# What is larger would fill the memory before anything could be said of it.
+_LARGEST_SCENARIO = 2**24
+_LARGEST_SIGNAL_FILE = 2**30
 
 
 def packaged_scenarios() -> tuple[str, ...]:
@@ -47,7 +54,7 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         return file.read_text("utf-8"), Path(str(file)).parent
     path = Path(source)
     try:
-        return path.read_text("utf-8-sig"), path.resolve().parent
+        return _contents(path, _LARGEST_SCENARIO).decode("utf-8-sig"), Path(os.path.realpath(path)).parent
     except (FileNotFoundError, NotADirectoryError) as error:
         if path.suffix == ".toml" and path.parent.is_dir():
             there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
@@ -57,12 +64,50 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         text = "is a folder: expected a TOML file or the name of a packaged scenario"
         raise InputError(Problem(name, "", text)) from error
     except (OSError, ValueError) as error:  # no UTF-8, and names that no file can have
-        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({error})")) from error
+        why = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({why})")) from error
 
 
-def canonical_path(path: str, folder: Path) -> str:
-    """A path as it means the same from every folder."""
-    return path if path.startswith(PACKAGED) else str((folder / path).resolve())
+def _contents(path: Path, largest: int) -> bytes:
+    """Contents of a regular file.
+
+    Raises OSError if it is none (a pipe or a device need not end), or has more than `largest` bytes; ValueError for a
+    name that no file can have.
+    """
+    found = path.stat()
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "is a folder", str(path))
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "a pipe or a device: expected a regular file", str(path))
+    if found.st_size > largest:
+        raise OSError(errno.EFBIG, f"more than {largest >> 20} MiB", str(path))
+    return path.read_bytes()
+
+
+def canonical_path(path: str, folder: Path, where: str, key: str) -> str:
+    """A path as it means the same from every folder.
+
+    where, key  what it stands in, for messages
+    Raises InputError for a path that no file can have.
+    """
+    if path.startswith(PACKAGED):
+        return path
+    try:
+        found = os.path.realpath(folder / path)
+        found.encode()
+        return found
+    except (OSError, ValueError) as error:  # a NUL, a working directory that is gone, a name that no TOML can hold
+        raise InputError(Problem(where, key, f"is no path of a file ({error})", repr(path))) from error
+
+
+def relative_path(path: str, folder: Path) -> str:
+    """A canonical path as it reads in a file in `folder`, where there is a way from here to there."""
+    if path.startswith(PACKAGED):
+        return path
+    try:
+        return os.path.relpath(path, os.path.realpath(folder))
+    except ValueError:  # on another drive
+        return path
 
 
 def read_signal_file(path: str, where: str, key: str) -> bytes:
@@ -79,9 +124,10 @@ def read_signal_file(path: str, where: str, key: str) -> bytes:
         return _packaged_file(name).read_bytes()
     file = Path(path)
     try:
-        return file.read_bytes()
+        return _contents(file, _LARGEST_SIGNAL_FILE)
     except FileNotFoundError as error:
         there = tuple(sorted(item.name for item in file.parent.glob("*.csv")))
         raise InputError(Problem(where, key, f"there is no file {path}", "", file.name, there)) from error
-    except OSError as error:
-        raise InputError(Problem(where, key, f"{path} cannot be read ({error.strerror})")) from error
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InputError(Problem(where, key, f"{path} cannot be read ({why})")) from error

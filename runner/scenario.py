@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from os import PathLike
 from pathlib import Path
@@ -23,7 +23,7 @@ from springline.runner import schema
 from springline.runner.checking import Document, resolve
 from springline.runner.dotted import expect_keys, flat, plain, replaced, scale_key
 from springline.runner.errors import InputError, Problem, shortened, unknown
-from springline.runner.locate import packaged_scenarios, read_scenario
+from springline.runner.locate import packaged_scenarios, read_scenario, relative_path
 from springline.runner.tables import Table
 from springline.runner.toml_text import document_text
 
@@ -47,22 +47,34 @@ class NumericKey:
     leaves: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scenario with every default filled in; immutable. Two are equal if their documents and tables are.
+    """A scenario with every default filled in; immutable.
 
-    source    the file or packaged name it was loaded from
-    folder    what relative paths in it refer to
-    document  its tables as plain data; read it, do not change it
+    Two are equal if their documents and the contents of their signal tables are, wherever the files of these lie.
+
+    source         the file or packaged name it was loaded from
+    folder         what relative paths in overrides count from: the working directory, or the folder of the sweep
+    document       its tables as plain data; read it, do not change it
+    signal_tables  its signals from CSV files, in the order of System.tables
+    notes          what was made of the CSV files, a sentence each, for people
     """
 
-    source: str = field(compare=False)
-    folder: Path = field(compare=False)
+    source: str
+    folder: Path
     document: Document
     signal_tables: tuple[Table, ...]
+    notes: tuple[str, ...] = ()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scenario) and self._identity == other._identity
 
     def __hash__(self) -> int:
-        return hash(self.to_toml())
+        return hash(self._identity)
+
+    @cached_property
+    def _identity(self) -> tuple[str, tuple[Table, ...]]:
+        return document_text(_with_paths(self.document, lambda path: "")), self.signal_tables
 
     # What the loop is told
 
@@ -221,6 +233,7 @@ class Scenario:
         """This scenario with other values at some dotted keys ("control.mu.0", "plant.m3.scale", …).
 
         A new kind of reference or base motion, another control mode or mechanism drops what belonged to the old one.
+        Paths count from `folder`.
         Raises TypeError for what is no mapping of texts, InputError for whatever a file may not hold either.
         """
         expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
@@ -248,15 +261,20 @@ class Scenario:
             raise InputError(*problems)
         return Scenario(self.source, self.folder, *resolve(document, where, self.folder))
 
-    def to_toml(self) -> str:
-        """The complete scenario as TOML; loading it gives an equal one."""
-        return document_text(self.document)
+    def to_toml(self, folder: Path | None = None) -> str:
+        """The complete scenario as TOML; loading it gives an equal one.
+
+        folder  where the text is to stand: paths in it count from there; without it they are absolute
+        """
+        if folder is None:
+            return document_text(self.document)
+        return document_text(_with_paths(self.document, lambda path: relative_path(path, folder)))
 
 
 def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
     """Load a scenario: a TOML file, or a packaged one by name ("paper/group1_shake").
 
-    overrides  values by dotted key that take the place of the file's
+    overrides  values by dotted key that take the place of the file's; paths in them count from the working directory
     Raises InputError that names all mistakes at once: file, key, what was expected, the nearest valid name. Raises
     TypeError for a source that is no path or name, and overrides that are no mapping of texts.
     """
@@ -267,7 +285,7 @@ def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = N
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
-    scenario = Scenario(name, folder, *resolve(document, name, folder))
+    scenario = Scenario(name, Path(), *resolve(document, name, folder))
     return scenario if overrides is None else scenario.with_overrides(overrides)
 
 
@@ -346,6 +364,13 @@ def _numeric_keys(structure: Structure) -> dict[str, NumericKey]:
         meaning = first.meaning.rpartition(" (")[0]
         keys[stem] = NumericKey(units, first.bounds, f"{meaning} (all joints)", tuple(leaves))
     return keys
+
+
+def _with_paths(document: Document, moved: Callable[[str], str]) -> Document:
+    """A document whose signal tables name other paths."""
+    return {
+        name: table | {"path": moved(table["path"])} if "path" in table else table for name, table in document.items()
+    }
 
 
 def _shape(table: Mapping[str, Any], coordinates: Sequence[str]) -> SignalShape:

@@ -335,6 +335,7 @@ def _table_section(units: Mapping[str, str]) -> type[Section]:
             "path": (Annotated[str, text()], ...),
             "columns": (columns, ...),
             "units": (in_units, Field(default_factory=in_units)),
+            "t0": (Annotated[float, number("s")], 0.0),
             "ends": (Annotated[str, choice("ends", ENDS)], ENDS[0]),
         },
     )

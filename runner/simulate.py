@@ -33,7 +33,7 @@ from springline.model.parameters import Joint
 from springline.model.system import System
 from springline.runner.errors import InputError, Problem
 from springline.runner.scenario import Scenario, expect_scenario
-from springline.runner.tables import Table as SignalTable
+from springline.runner.tables import kernel_tables
 
 Floats = NDArray[np.float64]
 _MOST_ROWS = 10_000_000
@@ -119,20 +119,6 @@ def loop_settings(scenario: Scenario, *, trajectory: bool) -> LoopSettings:
         response_band=scenario.response_band,
         settling_band=scenario.settling_band,
     )
-
-
-def kernel_tables(tables: Sequence[SignalTable]) -> list[Table]:
-    """Signal tables as the loop takes them: held ends become constant intervals outside the data."""
-    result = []
-    for table in tables:
-        coefficients, t0 = table.coefficients, table.t0
-        if table.ends == "hold":
-            first, last = np.zeros((2, 1, *coefficients.shape[1:]))
-            first[0, :, 0] = coefficients[0, :, 0]
-            last[0, :, 0] = coefficients[-1] @ table.dt ** np.arange(4)
-            coefficients, t0 = np.concatenate([first, coefficients, last]), t0 - table.dt
-        result.append(Table(t0, table.dt, table.ends == "periodic", coefficients))
-    return result
 
 
 def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tuple[str, str]:

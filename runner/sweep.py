@@ -225,7 +225,7 @@ class _Reader:
         try:
             scenario = load_scenario(path if path.is_file() else source)
             key = "set"
-            return scenario.with_overrides(dict(_flattened(overrides)))
+            return replace(scenario, folder=self._folder).with_overrides(dict(_flattened(overrides)))
         except InputError as error:
             there = f"{self._name}: {key}"
             self._problems += [replace(problem, where=f"{there}: {problem.where}") for problem in error.problems]

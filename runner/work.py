@@ -26,7 +26,8 @@ from springline.codegen.manifest import canonical_json
 from springline.codegen.program import program
 from springline.model.system import Structure, System
 from springline.runner.scenario import Scenario, Slots, per_run
-from springline.runner.simulate import kernel_tables, loop_settings
+from springline.runner.simulate import loop_settings
+from springline.runner.tables import kernel_tables
 
 Floats = NDArray[np.float64]
 

@@ -61,6 +61,8 @@ def batch(
     from springline.runner.sweep import load_sweep
 
     loaded = load_sweep(sweep)
+    for note in loaded.scenario.notes:
+        complain(note)
     plan = Plan(loaded)
     destination = output or str(Path("results", Path(sweep).stem))
     dataset = Dataset(place(destination))
@@ -240,7 +242,7 @@ def replay(
     scenario = replayed(source, run)
     row = recorded(source, run)
     result = simulate(scenario)
-    files = {"scenario.toml": scenario.to_toml().encode()}
+    files = {"scenario.toml": scenario.to_toml(folder).encode()}
     if plot:
         for name, figure in run_figures(scenario, result).items():
             files |= figure_files(f"figures/{name}", figure)

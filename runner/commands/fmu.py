@@ -16,7 +16,7 @@ from springline.codegen.manifest import read_manifest, write_tree
 from springline.runner.commands.options import TUNABLE, AsJson, Force, ScenarioName, tunable_names
 from springline.runner.commands.run import refuse_files
 from springline.runner.errors import InputError, Problem
-from springline.runner.terminal import print_json, say
+from springline.runner.terminal import complain, print_json, say
 
 if TYPE_CHECKING:
     from springline.codegen.fmu import Settings
@@ -61,7 +61,7 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
     ) -> None:
         from springline.codegen.fmu import fmu
         from springline.runner.scenario import load_scenario
-        from springline.runner.simulate import kernel_tables
+        from springline.runner.tables import kernel_tables
 
         refuse_files(output)
         others = _earlier(output, keep_edited=force)
@@ -89,6 +89,8 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         kept = {name: (output / name).read_bytes() for name in others}
         manifest = {"kind": _KIND, "fmus": sorted([*others.values(), entry], key=lambda fmu: str(fmu["name"]))}
         changes = write_tree(output, {**kept, path: content}, manifest, force=force)
+        for note in loaded.notes if part is not Part.controller else ():
+            complain(note)
         done = "written" if path in changes.written else "unchanged"
         if as_json:
             print_json(f"export fmu{version}", [{"path": path, "change": done}], {})

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from springline.runner.errors import InputError, Problem
-from springline.runner.terminal import number, print_json, print_table, progress, say
+from springline.runner.terminal import complain, number, print_json, print_table, progress, say
 
 if TYPE_CHECKING:
     from springline.model.parameters import Joint
@@ -80,12 +80,14 @@ def run(
     _refuse_too_large(folder, loaded, form)
     with progress(f"simulating {scenario}", quiet=as_json) as report:
         result = simulate(loaded, engine=engine.value, progress=report)
-    files = {"scenario.toml": loaded.to_toml().encode()}
+    files = {"scenario.toml": loaded.to_toml(folder).encode()}
     if plot:
         files |= _figures(loaded, result, quiet=as_json)
     files |= table_files("trajectory", result.trajectory, form.value)
     files |= table_files("metrics", result.metrics, form.value)
     write_folder(folder, files, replaces=OUTPUTS)
+    for note in loaded.notes:
+        complain(note)
     if as_json:
         print_json("run", result.metrics.to_pylist(), units(result.metrics), result.status)
         return

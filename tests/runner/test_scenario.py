@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import pickle
 import time
 import tomllib
@@ -374,6 +375,13 @@ ends = "{ends}"
         ("other.csv", "", "hold", ["base_motion.columns.shake", "unknown column", "'a'"]),
         ("", "", "hold", ["base_motion.path", "a text in quotes"]),
         (".", "", "hold", ["base_motion.path", "cannot be read"]),
+        ("a\\u0000b.csv", "", "hold", ["base_motion.path", "is no path of a file", "null"]),
+        ("loop.csv", "", "hold", ["base_motion.path", "cannot be read", "symbolic links"]),
+        ("loop.csv/x.csv", "", "hold", ["base_motion.path", "cannot be read"]),
+        ("pipe.csv", "", "hold", ["base_motion.path", "a pipe or a device: expected a regular file"]),
+        ("/dev/zero", "", "hold", ["base_motion.path", "/dev/zero", "a pipe or a device"]),
+        ("huge.csv", "", "hold", ["base_motion.path", "more than 1024 MiB"]),
+        ("a" * 5000, "", "hold", ["base_motion.path", "cannot be read"]),
     ],
 )
 def test_mistakes_about_tables_are_told(
@@ -381,6 +389,10 @@ def test_mistakes_about_tables_are_told(
 ) -> None:
     (tmp_path / "motion.csv").write_text("t,a\n" + "".join(f"{k / 4},{k}\n" for k in range(9)))
     (tmp_path / "other.csv").write_text("t,b\n0,0\n1,0\n2,0\n3,0\n")
+    (tmp_path / "loop.csv").symlink_to("loop.csv")
+    os.mkfifo(tmp_path / "pipe.csv")
+    with (tmp_path / "huge.csv").open("wb") as file:
+        file.truncate(2**30 + 1)  # a hole, which takes no room on the disk
     message = told(TABLE.format(path=path, units=units, ends=ends))
     assert "s.toml" in message
     assert all(part in message for part in expected), message
@@ -389,6 +401,199 @@ def test_mistakes_about_tables_are_told(
 def test_a_table_needs_a_coordinate(told) -> None:
     message = told('[base_motion]\nkind = "table"\npath = "x.csv"\ncolumns = { t = "t" }')
     assert "base_motion.columns" in message and "at least one of shake, pitch, roll" in message
+
+
+# Where the run lies in the record
+
+
+@pytest.fixture
+def recorded(load, tmp_path: Path):
+    """A scenario with a record of some times (s) and values (m) as its base's shake; `extra` adds to the table."""
+
+    def recorded(times: np.ndarray, values: np.ndarray, extra: str = "", duration: float = 4.0) -> Scenario:
+        lines = "".join(f"{t!r},{v!r}\n" for t, v in zip(times.tolist(), values.tolist(), strict=True))
+        (tmp_path / "motion.csv").write_text(f"t,a\n{lines}")
+        return load(TABLE.format(path="motion.csv", units="", ends="hold") + extra, {"simulation.duration": duration})
+
+    return recorded
+
+
+@pytest.mark.parametrize(
+    ("start", "unit", "extra", "told"),
+    [
+        (1.7e9, 1.0, "", ["lasts from 1700000000 to 1700000010 s", "the run takes 0 to 4 s", "t0 = 1700000000 starts"]),
+        (1.7e12, 1e3, "", ["lasts from 1700000000000 to 1700000010000 s", "units.t"]),
+        (4.0, 1.0, "", ["lasts from 4 to 14 s", "takes 0 to 4 s", "t0 = 4 starts", "got 0.0 s"]),
+        (-10.0, 1.0, "", ["lasts from -10 to 0 s", "takes 0 to 4 s"]),
+        (0.0, 1.0, "t0 = 10.5", ["lasts from 0 to 10 s", "takes 10.5 to 14.5 s", "t0 = 0 starts", "got 10.5 s"]),
+        (25.0, 1.0, "t0 = 20.5", ["lasts from 25 to 35 s", "takes 20.5 to 24.5 s", "got 20.5 s"]),
+    ],
+)
+def test_a_record_beside_the_run_is_told(start: float, unit: float, extra: str, told: list[str], recorded) -> None:
+    t = start + np.linspace(0.0, 10.0, 41) * unit
+    with pytest.raises(InputError) as caught:
+        recorded(t, np.sin(np.arange(41.0)), extra)
+    (problem,) = caught.value.problems
+    assert problem.key == "base_motion.t0"
+    assert all(part in str(problem) for part in told), str(problem)
+
+
+@pytest.mark.parametrize(
+    ("start", "extra", "duration", "told"),
+    [
+        (1.7e9, "t0 = 1700000000", 4.0, ["lasts from 1700000000 to 1700000010 s", "1700000000 to 1700000004 s of it"]),
+        (1.7e9, "t0 = 1700000003.25", 2.0, ["1700000003.25 to 1700000005.25 s of it"]),
+        (0.0, "", 4.0, ["lasts from 0 to 10 s", "the run takes 0 to 4 s of it"]),
+        (1.0, "", 4.0, ["takes 0 to 4 s of it; before the record the motion starts from rest at its first value"]),
+        (0.0, "t0 = 8.0", 4.0, ["takes 8 to 12 s of it; after the record the motion comes to rest at its last value"]),
+        (0.0, "", 0.1, ["less than one of its sample intervals of 0.25 s (is units.t right?)"]),
+    ],
+)
+def test_a_note_tells_the_span_that_the_run_uses(
+    start: float, extra: str, duration: float, told: list[str], recorded
+) -> None:
+    scenario = recorded(start + np.linspace(0.0, 10.0, 41), np.sin(np.arange(41.0)), extra, duration)
+    (note,) = scenario.notes
+    assert note.startswith("base_motion: ") and all(part in note for part in told), note
+    assert ("rest" in note) == ("rest" in told[-1])
+    assert scenario.with_overrides({"base_motion.kind": "none"}).notes == ()
+
+
+def test_t0_moves_the_record_and_nothing_else(recorded) -> None:
+    t, values = np.linspace(0.0, 10.0, 41), np.sin(np.arange(41.0))
+    (plain,) = recorded(t, values).tables()
+    for extra, shift in (("t0 = 2.5", -2.5), ("t0 = -3", 3.0), ("t0 = 0.0", 0.0)):
+        (moved,) = recorded(t, values, extra).tables()
+        assert moved.t0 == shift and moved.end == plain.end + shift
+        assert np.array_equal(moved.coefficients, plain.coefficients)
+    (late,) = recorded(1.7e9 + t, values, "t0 = 1700000002.5").tables()
+    assert late.t0 == -2.5 and np.array_equal(late.coefficients, plain.coefficients)
+
+
+def test_t0_is_counted_in_seconds_whatever_the_unit_of_the_times(load, tmp_path: Path) -> None:
+    (tmp_path / "ms.csv").write_text("t,a\n" + "".join(f"{k * 60},{k}\n" for k in range(100)))
+    text = TABLE.format(path="ms.csv", units='t = "ms"', ends="hold") + "t0 = 1.5"
+    (table,) = load(text).tables()
+    assert (table.t0, table.end) == (pytest.approx(-1.5), pytest.approx(5.94 - 1.5))
+    (table,) = load(text.replace('"ms"', '"min"').replace("1.5", "90")).tables()
+    assert (table.t0, table.dt) == (-90.0, 3600.0)
+
+
+@pytest.mark.parametrize("t0", [0.0, 0.75, -2.0, 1e6 + 0.25, -1.7e9])
+def test_a_periodic_record_is_entered_at_t0(t0: float, load, tmp_path: Path) -> None:
+    t = np.linspace(0.0, 2.0, 65)
+    (tmp_path / "wave.csv").write_text("t,a\n" + "".join(f"{k!r},{math.sin(math.pi * k)!r}\n" for k in t.tolist()))
+    scenario = load(TABLE.format(path="wave.csv", units="", ends="periodic") + f"t0 = {t0!r}")
+    (table,) = scenario.tables()
+    assert -2.0 < table.t0 <= 0.0 and (t0 + table.t0) % 2.0 == 0.0
+    assert scenario.notes == (f"base_motion: {tmp_path / 'wave.csv'} repeats every 2 s, and the run begins at its "
+                              f"{t0:.12g} s",)  # fmt: skip
+
+
+def test_a_run_that_must_lie_in_the_record_does_so_from_t0_on(recorded) -> None:
+    t, values = np.linspace(0.0, 10.0, 41), np.sin(np.arange(41.0))
+    assert recorded(1.7e9 + t, values, "t0 = 1700000006").with_overrides({"base_motion.ends": "error"}).steps == 40_000
+    inside = recorded(t, values, "t0 = 6").with_overrides({"base_motion.ends": "error"})
+    assert inside.tables()[0].end == 4.0
+    for t0 in (6.1, -0.5):
+        with pytest.raises(InputError, match=rf"lasts from 0 to 10 s: expected all of {t0:g} to {t0 + 4:g} s"):
+            inside.with_overrides({"base_motion.t0": t0})
+
+
+def test_wrapped_angles_of_base_and_joints_are_noted(load, tmp_path: Path) -> None:
+    t = np.arange(0.0, 8.0)
+    turned = 350.0 + 4.0 * t
+    lines = zip(t.tolist(), (turned % 360.0).tolist(), turned.tolist(), (turned * 1e3).tolist(), strict=True)
+    (tmp_path / "m.csv").write_text("t,wrapped,straight,high\n" + "".join(",".join(map(repr, x)) + "\n" for x in lines))
+    base = """
+    kind = "table"
+    path = "m.csv"
+    columns = {{ t = "t", {length} = "high", {angle} = "{column}" }}
+    units = {{ {angle} = "deg" }}
+    """
+    text = "[base_motion]" + base + "[reference]" + base.replace("{length}", "lift").replace("{angle}", "rotation")
+    text = text.replace("{length}", "shake").replace("{angle}", "roll")
+    wrapped, straight = (load(text.format(column=column)) for column in ("wrapped", "straight"))
+    assert wrapped.tables() == straight.tables()
+    noted = [note for note in wrapped.notes if "wraps" in note]
+    assert [note.split(":")[0] for note in noted] == ["reference.columns.rotation", "base_motion.columns.roll"]
+    assert all("at line 5: " in note for note in noted)
+    assert not any("wraps" in note for note in straight.notes)
+
+
+# Where the record lies on the disk
+
+
+def record_folder(folder: Path, content: str) -> Path:
+    """A folder with a scenario and, below it, the record that it names."""
+    (folder / "data").mkdir(parents=True)
+    (folder / "data" / "motion.csv").write_text(content)
+    (folder / "s.toml").write_text(TABLE.format(path="data/motion.csv", units="", ends="hold"))
+    return folder / "s.toml"
+
+
+RECORD = "t,a\n" + "".join(f"{k},{k % 3}\n" for k in range(9))
+
+
+def test_scenarios_with_the_same_record_are_equal_wherever_it_lies(tmp_path: Path) -> None:
+    one, two, other = (
+        load_scenario(record_folder(tmp_path / name, content))
+        for name, content in (("one", RECORD), ("two", RECORD), ("three", RECORD.replace("8,2", "8,1")))
+    )
+    assert one == two and hash(one) == hash(two)
+    assert one != other
+    assert one != two.with_overrides({"base_motion.t0": 1.0})
+
+
+def test_a_resolved_scenario_finds_its_record_from_where_it_stands(tmp_path: Path) -> None:
+    scenario = load_scenario(record_folder(tmp_path / "work", RECORD))
+    results = tmp_path / "work" / "results" / "s"
+    text = scenario.to_toml(results)
+    assert tomllib.loads(text)["base_motion"]["path"] == "../../data/motion.csv"
+    results.mkdir(parents=True)
+    (results / "scenario.toml").write_text(text)
+    (tmp_path / "work").rename(tmp_path / "elsewhere")
+    moved = load_scenario(tmp_path / "elsewhere" / "results" / "s" / "scenario.toml")
+    assert moved == scenario and moved.to_toml(tmp_path / "elsewhere" / "results" / "s") == text
+    packaged = load_scenario("ship/vessel_10hz")
+    assert packaged.to_toml(results) == packaged.to_toml()
+
+
+def test_paths_in_overrides_count_from_the_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record_folder(tmp_path / "here", RECORD)
+    monkeypatch.chdir(tmp_path / "here")
+    table = {"kind": "table", "path": "data/motion.csv", "columns": {"t": "t", "shake": "a"}}
+    scenario = load_scenario("paper/nominal", {"base_motion": table})
+    assert scenario.document["base_motion"]["path"] == str(tmp_path / "here" / "data" / "motion.csv")
+    monkeypatch.chdir(tmp_path)  # what was found stays found
+    assert scenario.with_overrides({"base_motion.t0": 1.0}).tables()[0].t0 == -1.0
+
+
+def test_a_record_whose_name_no_toml_can_hold_is_refused(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff"))
+    with pytest.raises(InputError, match=r"base_motion\.path: is no path of a file \('utf-8' codec can't encode"):
+        load_scenario(record_folder(folder, RECORD))
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("pipe.toml", "a pipe or a device: expected a regular file"),
+        ("/dev/zero", "a pipe or a device: expected a regular file"),
+        ("loop.toml", "symbolic links"),
+        ("a\0b.toml", "null"),
+        ("huge.toml", "more than 16 MiB"),
+    ],
+)
+def test_what_is_no_file_to_read_is_told(name: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe.toml")
+    Path("loop.toml").symlink_to("loop.toml")
+    with Path("huge.toml").open("wb") as file:
+        file.truncate(2**24 + 1)
+    for source in (name, Path(name)):
+        with pytest.raises(InputError, match=rf"cannot be read as a text file in UTF-8 \(.*{told}"):
+            load_scenario(source)
 
 
 def test_unknown_scenarios_are_told(tmp_path: Path) -> None:
