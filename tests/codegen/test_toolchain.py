@@ -384,7 +384,7 @@ def test_cache_root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("cc", ['gcc "x', "gcc 'x", "gcc \\", '"'])
 def test_cc_that_is_no_command_line_is_named(cc: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", cc)
-    with pytest.raises(ToolchainError, match="the environment variable CC is .* no command line") as caught:
+    with pytest.raises(ToolchainError, match=r"the environment variable CC is .* no command line") as caught:
         find_compiler()
     assert repr(cc) in str(caught.value)
     assert [row.ok for row in checks() if row.name == "C compiler"] == [False]
@@ -436,7 +436,9 @@ def test_a_compiler_for_another_machine_is_named(
     real = " ".join(find_compiler().argv)
     patch = f"printf '\\{byte:o}' | dd of=library.so bs=1 seek={offset} conv=notrunc status=none"
     cross = wrap("cross-cc", f'case "$*" in *library.so*) {real} "$@" && {patch}; exit;; esac')
-    with pytest.raises(ToolchainError, match="cross-cc makes code for another machine .*set CC to a compiler for this"):
+    with pytest.raises(
+        ToolchainError, match=r"cross-cc makes code for another machine .*set CC to a compiler for this"
+    ):
         build_library(SOURCES, main="main.c", compiler=cross)
 
 
@@ -504,7 +506,7 @@ def test_without_a_home_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(Path, "home", homeless)
     for name in ("SPRINGLINE_CACHE", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
-    with pytest.raises(ToolchainError, match="no home here .*set SPRINGLINE_CACHE"):
+    with pytest.raises(ToolchainError, match=r"no home here .*set SPRINGLINE_CACHE"):
         build_library(SOURCES, main="main.c")
     assert [(row.name, row.ok) for row in checks()][-1] == ("cache", False)
 
