@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import shlex
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Literal
 
 from springline.runner.errors import InputError, Problem, unknown
 
 PACKAGED = "springline:"
 """A path that begins so is that of a file beside the packaged scenarios: "springline:data/vessel_orcaflex_10hz.csv"."""
+
+
+_SWEEPS_OWN = ("scenario", "vary", "method", "samples", "keep")
+
+
+def kind_of(document: Mapping[str, object]) -> Literal["scenario", "sweep"]:
+    """What a TOML document is, by the keys at its top: a sweep varies a scenario that it names."""
+    return "sweep" if any(key in document for key in _SWEEPS_OWN) else "scenario"
 
 
 def packaged_scenarios() -> tuple[str, ...]:
@@ -52,9 +62,15 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         if path.suffix == ".toml" and path.parent.is_dir():
             there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
             raise InputError(Problem(name, "", "there is no such file", "", path.name, there)) from error
+        if not isinstance(source, Path) and name in _packaged(scenarios_folder() / "sweeps", ".toml"):
+            raise InputError(Problem(name, "", f"this is a sweep: springline batch {shlex.quote(name)}")) from error
         raise InputError(unknown(name, "", "file or packaged scenario", name, packaged_scenarios())) from error
     except IsADirectoryError as error:
         text = "is a folder: expected a TOML file or the name of a packaged scenario"
+        if (path / "sweep.json").is_file():
+            text = f"this is a dataset: springline replay {shlex.quote(name)} RUN"
+        elif (path / "scenario.toml").is_file():
+            text = f"is a folder: its scenario is {path / 'scenario.toml'}"
         raise InputError(Problem(name, "", text)) from error
     except (OSError, ValueError) as error:  # no UTF-8, and names that no file can have
         raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({error})")) from error
