@@ -23,7 +23,6 @@ from springline.runner.commands import batch, bench, doctor, fmu, generate, list
 from springline.runner.errors import InputError
 from springline.runner.terminal import complain, say, version
 
-
 _TRACEBACK = "SPRINGLINE_TRACEBACK"
 
 

@@ -53,7 +53,8 @@ def batch(
 ) -> None:
     """Simulate every run of a sweep into one table, one row a run.
 
-    A summary and figures come with it. Ctrl-C, and even a crash, loses no more than the runs under way: --resume goes on from there.
+    A summary and figures come with it. Ctrl-C, and even a crash, loses no more than the runs under way: --resume goes
+    on from there.
     """
     from springline.runner.batch import estimate, open_pool, run_sweep, versions
     from springline.runner.dataset import Dataset, place

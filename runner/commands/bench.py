@@ -31,7 +31,8 @@ def bench(
 ) -> None:
     """Time springline and its alternatives on this machine.
 
-    Evaluations, agreement, compile times. Exit code 1 if a contender's result differs from springline's by more than its tolerance.
+    Evaluations, agreement, compile times. Exit code 1 if a contender's result differs from springline's by more than
+    its tolerance.
     """
     from springline.benchmarks.contenders import CONTENDERS
     from springline.benchmarks.harness import QUICK, UNITS, Effort, measure

@@ -98,8 +98,8 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         others.pop(path, None)
         kept = {name: (output / name).read_bytes() for name in others}
         manifest = {"kind": _KIND, "fmus": sorted([*others.values(), entry], key=lambda fmu: str(fmu["name"]))}
-        changes = write_tree(output, {**kept, path: content}, manifest, force=force)
-        done = "written" if path in changes.written else "unchanged"
+        written = write_tree(output, {**kept, path: content}, manifest, force=force).written
+        done = "written" if path in written else "unchanged"
         if as_json:
             print_json(f"export fmu{version}", [{"path": path, "change": done}], {})
         else:

@@ -55,7 +55,8 @@ def run(
 ) -> None:
     """Simulate one scenario; write its tables and figures.
 
-    Trajectory, metrics, figures and the resolved scenario go into one folder. A run that diverges is a result: it is reported with the quantity and the time, and the exit code is 0.
+    Trajectory, metrics, figures and the resolved scenario go into one folder. A run that diverges is a result: it is
+    reported with the quantity and the time, and the exit code is 0.
     """
     from springline.runner.locate import packaged_scenarios
     from springline.runner.scenario import load_scenario
