@@ -249,6 +249,8 @@ def _expect_trusted(root: Path, entry: Path) -> None:
             found = place.stat()
         except FileNotFoundError:
             return
+        if place != entry / _LIBRARY and not stat.S_ISDIR(found.st_mode):
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(place))
         if found.st_uid not in (me, 0):
             raise ToolchainError(
                 f"the cache would run the code of another user: {place} belongs to user {found.st_uid}, and you are "

@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import traceback
 from pathlib import Path
@@ -104,12 +105,13 @@ def springline(
 def main() -> None:
     """Entry point of the `springline` command."""
     _open_streams()
+    _mend_environment()
     code: Any = 0
     try:
-        app(prog_name="springline")
-    except SystemExit as end:
-        code = end.code
-    try:
+        try:
+            app(prog_name="springline")
+        except SystemExit as end:
+            code = end.code
         sys.stdout.flush()
     except OSError as error:  # a full disk, or nobody reads any more
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for Python tries again at its end
@@ -117,6 +119,14 @@ def main() -> None:
             complain(f"Error: cannot write to the standard output: {error}")
         code = code or 1
     sys.exit(code)
+
+
+def _mend_environment() -> None:
+    """Take out of the environment what libraries would stumble over."""
+    for name in ("COLUMNS", "LINES"):  # Rich takes for a number whatever has digits, "²" too
+        if not re.fullmatch("[0-9]{1,4}", os.environ.get(name, "0")):
+            del os.environ[name]
+    os.environ["MPLBACKEND"] = "Agg"  # all figures go into files, whatever windows a user's own plots have
 
 
 def _open_streams() -> None:
