@@ -68,9 +68,15 @@ def expect_folder(folder: Path, *, writable: bool = True) -> None:
         except (OSError, ValueError) as error:  # links in a circle, too long, not allowed, a NUL
             problem = f"cannot be a folder ({getattr(error, 'strerror', None) or error})"
         else:
-            if stat.S_ISDIR(mode) and (not writable or os.access(place, os.W_OK | os.X_OK)):
+            longest = os.pathconf(place, "PC_NAME_MAX")
+            if not stat.S_ISDIR(mode):
+                problem = "is a file where a folder was expected"
+            elif any(len(os.fsencode(part)) > longest for part in folder.relative_to(place).parts):
+                problem = f"would hold a name longer than {longest} bytes"
+            elif writable and not os.access(place, os.W_OK | os.X_OK):
+                problem = "cannot be written to"
+            else:
                 return
-            problem = "cannot be written to" if stat.S_ISDIR(mode) else "is a file where a folder was expected"
         raise InputError(Problem(str(place), "", f"{problem}; choose another with -o"))
     raise InputError(Problem(str(folder), "", "is in no folder: the current one is gone"))
 

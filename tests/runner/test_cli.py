@@ -301,20 +301,10 @@ def test_a_folder_that_cannot_be_is_refused_before_anything_is_done(command: lis
     (elsewhere / "b").symlink_to("a")
     (elsewhere / "nothing").symlink_to("nowhere")
     before = sorted(elsewhere.iterdir())
-    for folder in (
-        "nul\0",
-        "nul\0/x",
-        "a",
-        "a/x",
-        "x" * 300,
-        "deep/" + "x" * 300,
-        "short.toml",
-        "short.toml/x",
-        "nothing",
-    ):
-        told = refused(*command, "-o", folder)
-        assert told.endswith("; choose another with -o\n")
-        assert "\0" not in told
+    for folder in ("a", "a/x", "x" * 300, "deep/" + "x" * 300, "short.toml", "short.toml/x", "nothing"):
+        assert refused(*command, "-o", folder).endswith("; choose another with -o\n")
+    for folder in ("nul\0", "nul\0/x"):
+        assert "null byte" in refused(*command, "-o", folder)
     assert sorted(elsewhere.iterdir()) == before
 
 
