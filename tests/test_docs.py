@@ -21,6 +21,7 @@ import pytest
 from typer.testing import CliRunner
 
 from springline.codegen.toolchain import find_compiler
+from springline.runner import plots
 from springline.runner import scenario as scenarios
 from springline.runner import sweep as sweeps
 from springline.runner.cli import app
@@ -101,6 +102,8 @@ def shorten(monkeypatch: pytest.MonkeyPatch) -> None:
         whole = load_sweep(*arguments, **options)
         return replace(whole, scenario=short(whole.scenario))
 
+    # tests/runner/test_plots.py looks at the figures, whose drawing would take most of the time.
+    monkeypatch.setattr(plots, "figure_files", lambda name, figure: {f"{name}.png": b"", f"{name}.svg": b""})
     monkeypatch.setattr(scenarios, "load_scenario", loaded)
     monkeypatch.setattr(sweeps, "load_sweep", swept)
 
