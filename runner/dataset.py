@@ -25,9 +25,10 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from springline.codegen.manifest import canonical_json
+from springline.codegen.unfinished import TEMPORARY
 from springline.runner.errors import InputError, Problem
 from springline.runner.plan import Chunk, Plan
-from springline.runner.storage import TEMPORARY, parquet_bytes, write_file
+from springline.runner.storage import parquet_bytes, write_file
 from springline.runner.toml_text import value_text
 
 DESCRIPTION = "sweep.json"

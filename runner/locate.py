@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
+import shlex
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Literal
 
 from springline.runner.errors import InputError, Problem, unknown
 
@@ -18,6 +20,14 @@ PACKAGED = "springline:"
 # What is larger would fill the memory before anything could be said of it.
 _LARGEST_SCENARIO = 2**24
 _LARGEST_SIGNAL_FILE = 2**30
+
+
+_SWEEPS_OWN = ("scenario", "vary", "method", "samples", "keep")
+
+
+def kind_of(document: Mapping[str, object]) -> Literal["scenario", "sweep"]:
+    """What a TOML document is, by the keys at its top: a sweep varies a scenario that it names."""
+    return "sweep" if any(key in document for key in _SWEEPS_OWN) else "scenario"
 
 
 def packaged_scenarios() -> tuple[str, ...]:
@@ -59,9 +69,15 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         if path.suffix == ".toml" and path.parent.is_dir():
             there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
             raise InputError(Problem(name, "", "there is no such file", "", path.name, there)) from error
+        if not isinstance(source, Path) and name in _packaged(scenarios_folder() / "sweeps", ".toml"):
+            raise InputError(Problem(name, "", f"this is a sweep: springline batch {shlex.quote(name)}")) from error
         raise InputError(unknown(name, "", "file or packaged scenario", name, packaged_scenarios())) from error
     except IsADirectoryError as error:
         text = "is a folder: expected a TOML file or the name of a packaged scenario"
+        if (path / "sweep.json").is_file():
+            text = f"this is a dataset: springline replay {shlex.quote(name)} RUN"
+        elif (path / "scenario.toml").is_file():
+            text = f"is a folder: its scenario is {path / 'scenario.toml'}"
         raise InputError(Problem(name, "", text)) from error
     except (OSError, ValueError) as error:  # no UTF-8, and names that no file can have
         why = error.strerror if isinstance(error, OSError) and error.strerror else error

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import re
+import shlex
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,13 +25,15 @@ from springline.runner import schema
 from springline.runner.checking import Document, resolve
 from springline.runner.dotted import expect_keys, flat, plain, replaced, scale_key
 from springline.runner.errors import InputError, Problem, shortened, unknown
-from springline.runner.locate import packaged_scenarios, read_scenario, relative_path
+from springline.runner.locate import kind_of, packaged_scenarios, read_scenario, relative_path
 from springline.runner.tables import Table
 from springline.runner.toml_text import document_text
 
 __all__ = ["NumericKey", "Scenario", "expect_scenario", "load_scenario", "packaged_scenarios", "parse_set"]
 
 Floats = NDArray[np.float64]
+_BARE_WORD = re.compile(r"([^\W\d]|\.{0,2}/)[\w.:/+-]*")
+
 Slots = dict[str, float | Floats]
 """Slot key -> one number for all runs, or a column (runs,) of them."""
 
@@ -285,6 +289,8 @@ def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = N
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
+    if kind_of(document) == "sweep":
+        raise InputError(Problem(name, "", f"this is a sweep: springline batch {shlex.quote(name)}"))
     scenario = Scenario(name, Path(), *resolve(document, name, folder))
     return scenario if overrides is None else scenario.with_overrides(overrides)
 
@@ -303,8 +309,9 @@ def expect_scenario(given: object) -> None:
 
 
 def parse_set(text: str, source: str) -> tuple[str, object]:
-    """KEY=TOMLVALUE as a key and a value: "control.delta=0.02", 'control.law="power"', "plant.m3={ scale = 1.2 }".
+    """KEY=TOMLVALUE as a key and a value: "control.delta=0.02", "control.law=power", "plant.m3={ scale = 1.2 }".
 
+    What is no TOML value but a bare word, or a path, is text: quotes inside a shell's quotes are a nuisance.
     source  the scenario that it is to override, for messages
     Raises InputError if it is not of that form.
     """
@@ -315,12 +322,20 @@ def parse_set(text: str, source: str) -> tuple[str, object]:
         raise InputError(Problem(where, "", "expected --set KEY=VALUE", schema.given_text(text)))
     try:
         parsed = tomllib.loads(f"value = {value}")
+    except tomllib.TOMLDecodeError as error:
+        if _BARE_WORD.fullmatch(value.strip()):
+            return key, value.strip()
+        raise _no_value(where, key, value, error) from error
     except (ValueError, RecursionError) as error:
-        hint = f"expected a TOML value ({error}); a text needs quotes: --set '{key}=\"…\"'"
-        raise InputError(Problem(where, key, hint, value.strip())) from error
+        raise _no_value(where, key, value, error) from error
     if set(parsed) != {"value"}:
         raise InputError(Problem(where, key, "expected one TOML value", schema.given_text(value)))
     return key, parsed["value"]
+
+
+def _no_value(where: str, key: str, value: str, error: Exception) -> InputError:
+    hint = f"expected a TOML value ({error}); a text of several words needs quotes: --set '{key}=\"…\"'"
+    return InputError(Problem(where, key, hint, value.strip()))
 
 
 def _overridden(source: str) -> str:

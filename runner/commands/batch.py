@@ -51,9 +51,10 @@ def batch(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Draw figures.")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print what became of the runs as JSON.")] = False,
 ) -> None:
-    """Simulate every run of a sweep; write a table with one row a run, and a summary.
+    """Simulate every run of a sweep into one table, one row a run.
 
-    Ctrl-C, and even a crash, loses no more than the runs under way: --resume goes on from there.
+    A summary and figures come with it. Ctrl-C, and even a crash, loses no more than the runs under way: --resume goes
+    on from there.
     """
     from springline.runner.batch import estimate, open_pool, run_sweep, versions
     from springline.runner.dataset import Dataset, place
@@ -225,11 +226,12 @@ def replay(
     force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
 ) -> None:
-    """Simulate one run of a dataset again, with its trajectory and figures.
+    """Simulate one run of a dataset again, trajectory included.
 
     The metrics must come out as the dataset has them, to the last bit; if they do not, the exit code is 1.
     """
-    from springline.runner.commands.run import OUTPUTS, print_metrics, refuse_occupied
+    from springline.runner.commands.options import refuse_occupied
+    from springline.runner.commands.run import OUTPUTS, print_metrics
     from springline.runner.dataset import Dataset, place
     from springline.runner.plots import figure_files, run_figures
     from springline.runner.replay import differences, recorded, replayed

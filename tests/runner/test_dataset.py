@@ -20,13 +20,13 @@ import pytest
 
 from springline.codegen import lanes
 from springline.codegen.kernel_source import runtime_sources
+from springline.codegen.unfinished import TEMPORARY
 from springline.runner import storage, work
 from springline.runner.batch import open_pool, run_sweep, versions
 from springline.runner.commands.batch import batch
 from springline.runner.dataset import Dataset, changes, place, read_dataset
 from springline.runner.errors import InputError
 from springline.runner.plan import Plan
-from springline.runner.storage import TEMPORARY
 from springline.runner.sweep import load_sweep
 
 SWEEP = """
