@@ -132,7 +132,7 @@ def read_manifest(folder: Path, kind: object) -> dict[str, Any] | None:
     try:
         manifest: dict[str, Any] = json.loads(content)
         listed = {entry["path"]: entry["sha256"] for entry in manifest["files"]}
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None
     # A manifest may come from elsewhere, and what it lists may be removed: no path of it leads outside.
     if not all(isinstance(path, str) and _stays_inside(path) for path in listed):
@@ -294,7 +294,7 @@ def _manifest_difference(old: bytes, new: bytes) -> str:
     """Which entries of the manifest differ, named by keys and by the ``name`` of list items."""
     try:
         found = [text for text in _differences(json.loads(old), json.loads(new)) if text]
-    except ValueError:
+    except (ValueError, RecursionError):
         return "is no JSON"
     shown = found[:5] + ([f"and {len(found) - 5} more"] if len(found) > 5 else [])
     return "; ".join(shown) or "is written in another form"

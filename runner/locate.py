@@ -1,13 +1,17 @@
-"""Where scenarios and their CSV files are: in the user's folders, or packaged with springline."""
+"""Where scenarios, sweeps and CSV files are, in the user's folders or packaged with springline, and which is which."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Literal
 
+from springline.runner import schema
 from springline.runner.errors import InputError, Problem, unknown
+from springline.runner.toml_text import read_toml
 
 PACKAGED = "springline:"
 """A path that begins so is that of a file beside the packaged scenarios: "springline:data/vessel_orcaflex_10hz.csv"."""
@@ -34,6 +38,60 @@ def _packaged(folder: Traversable, suffix: str, prefix: str = "") -> Iterator[st
             yield from _packaged(item, suffix, f"{prefix}{item.name}/")
         elif item.name.endswith(suffix):
             yield prefix + (item.name.removesuffix(suffix) if suffix == ".toml" else item.name)
+
+
+def packaged_sweeps() -> tuple[str, ...]:
+    """Names of the sweeps that come with springline, sorted."""
+    return tuple(sorted(_packaged(scenarios_folder() / "sweeps", ".toml")))
+
+
+def expect_kind(wanted: Literal["scenario", "sweep", "dataset"], source: str | Path) -> None:
+    """Raise InputError, with the command that takes it, for an input of another kind than a command wants.
+
+    source  what the user gave: a packaged name, a file, or a folder
+    What is of no kind that can be told passes, for whoever reads it to say what is wrong with it.
+    """
+    name = str(source)
+    found = _packaged_kind(name) or _kind_at(Path(name))
+    if not found or found == wanted:
+        return
+    quoted = shlex.quote(name)
+    commands = {
+        "scenario": f"springline run {quoted}",
+        "sweep": f"springline batch {quoted}",
+        "dataset": f"springline replay {quoted} RUN, or springline batch SWEEP -o {quoted} --resume",
+        "folder of a run": f"springline run {shlex.quote(str(Path(name, 'scenario.toml')))}",
+    }
+    raise InputError(Problem(name, "", f"is a {found}, expected a {wanted}: {commands[found]}"))
+
+
+def _packaged_kind(name: str) -> str:
+    if name in packaged_scenarios():
+        return "scenario"
+    return "sweep" if name in packaged_sweeps() else ""
+
+
+def _kind_at(path: Path) -> str:
+    """What a folder is by the files that our commands leave in it, and a file by its text."""
+    try:
+        if not path.is_dir():
+            return _text_kind(path.read_text("utf-8-sig")) if path.is_file() else ""
+        if (path / "sweep.json").exists():
+            return "dataset"
+        return "folder of a run" if (path / "scenario.toml").exists() else ""
+    except (OSError, ValueError):
+        return ""
+
+
+def _text_kind(text: str) -> str:
+    """What a TOML text is by its tables: only a sweep has [vary], and it has none of a scenario's own."""
+    try:
+        keys = read_toml(text).keys()
+    except ValueError:
+        return ""
+    if "vary" in keys or {"scenario", "samples"} <= keys:
+        return "sweep"
+    return "scenario" if keys & set(schema.TABLES) else ""
 
 
 def read_scenario(source: str | Path) -> tuple[str, Path]:

@@ -34,11 +34,12 @@ from springline.runner.cli import app
 from springline.runner.commands.batch import size_text, time_text
 from springline.runner.dataset import Dataset, place, read_dataset
 from springline.runner.errors import InputError
+from springline.runner.locate import packaged_sweeps
 from springline.runner.plan import Plan
 from springline.runner.quantiles import Quantiles
 from springline.runner.replay import stored_plan
 from springline.runner.summary import QUANTILES, summarize
-from springline.runner.sweep import load_sweep, packaged_sweeps
+from springline.runner.sweep import load_sweep
 from springline.runner.sweep_plots import rank_correlation
 from springline.runner.work import parcel, perform_parcel
 
