@@ -21,6 +21,7 @@ import re
 import shutil
 import socket
 import tempfile
+import tomllib
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from functools import cached_property
 from hashlib import sha256
@@ -106,6 +107,8 @@ class Place(Protocol):
 def place(destination: str | Path) -> Place:
     """The Place of a folder's path or a URL. Raises InputError for a URL that nothing installed can handle."""
     text = str(destination)
+    if "\0" in text:
+        raise InputError(Problem(repr(text), "", "no file or folder can have this name"))
     if "://" not in text or text.startswith("file://"):
         return Folder(Path(text.removeprefix("file://")))
     try:
@@ -345,7 +348,7 @@ class Dataset:
         try:
             changed = list(changes(_as_written(stored), _as_written(new)))
         except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
-            raise self.damaged(repr(error)) from error
+            raise self.damaged(error) from error
         if changed:
             shown = "\n  ".join(changed[:20])
             text = f"cannot be resumed, for what it holds is not what the sweep asks for now:\n  {shown}"
@@ -371,12 +374,10 @@ class Dataset:
             content = json.loads(self.place.read(DESCRIPTION))
         except (FileNotFoundError, NotADirectoryError) as error:
             raise InputError(Problem(self.place.name, "", f"holds no dataset: there is no {DESCRIPTION}")) from error
-        except (ValueError, OSError) as error:
-            raise self.damaged(str(error)) from error
-        except RecursionError as error:
-            raise self.damaged("brackets in brackets without end") from error
+        except (ValueError, OSError, RecursionError) as error:
+            raise self.damaged(error) from error
         if not isinstance(content, dict):
-            raise self.damaged("no table")
+            raise self.damaged(TypeError())
         return content
 
     @cached_property
@@ -385,8 +386,17 @@ class Dataset:
         told = {key: value for key, value in self.description().items() if key not in _FREE}
         return sha256(canonical_json(told)).hexdigest()
 
-    def damaged(self, how: str) -> InputError:
-        """The error of a description that cannot be what was written."""
+    def damaged(self, error: Exception) -> InputError:
+        """The error of a description that cannot be what was written, as reading it has shown."""
+        match error:
+            case KeyError():
+                how = f"there is no {error.args[0]!r}"
+            case RecursionError():
+                how = "brackets in brackets without end"
+            case json.JSONDecodeError() | tomllib.TOMLDecodeError() | OSError():
+                how = str(error)
+            case _:
+                how = "an entry is not what is written there"
         return InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({how})"))
 
     def expect_format(self, stored: Mapping[str, Any]) -> None:
@@ -487,19 +497,21 @@ class Dataset:
 
         Raises InputError if it is no table with these columns.
         """
+        where = f"{self.place.name}/{name}"
         try:
             with self.place.open(name) as file:
+                there = parquet.read_schema(file)
+                missing = [column for column in columns or () if column not in there.names]
+                if missing:
+                    raise InputError(*(unknown(where, "", "column", column, there.names) for column in missing))
+                file.seek(0)
                 # One thread: a column of a part is too little for more, and each would keep memory of its own.
                 table = parquet.read_table(file, columns=columns, use_threads=False)
+        except InputError:
+            raise
         except (pa.ArrowException, ValueError) as error:
             text = f"is damaged ({str(error).splitlines()[0]}): springline batch --resume makes it again"
-            raise InputError(Problem(f"{self.place.name}/{name}", "", text)) from error
-        missing = [column for column in columns or () if column not in table.column_names]
-        if missing:
-            with self.place.open(name) as file:
-                there = parquet.read_schema(file).names
-            where = f"{self.place.name}/{name}"
-            raise InputError(*(unknown(where, "", "column", column, there) for column in missing))
+            raise InputError(Problem(where, "", text)) from error
         return table.replace_schema_metadata(None)
 
 
@@ -546,7 +558,7 @@ def changes(old: Any, new: Any, where: str = "") -> Iterator[str]:
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new) and any(map(_is_table, old)):
         for i, (a, b) in enumerate(zip(old, new, strict=True)):
             yield from changes(a, b, f"{where}.{i}")
-    elif old != new:
+    elif old != new or type(old) is not type(new):  # true is no 1
         yield f"{where}: {_shown(old)} -> {_shown(new)}"
 
 

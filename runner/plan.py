@@ -18,6 +18,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from springline.codegen.doubles import double
 from springline.model.parameters import Bounds
 from springline.runner import sampling
 from springline.runner.errors import InputError, Problem, unknown
@@ -305,7 +306,7 @@ class Plan:
                 chosen = {axis.key: i for axis, i in zip([*crossed, *shared], [*fixed, *share], strict=True)}
                 constants = self._constants(chosen)
                 structural = {key: value for key, value in constants.items() if key not in self._numeric}
-                name = repr(structural)
+                name = given_text(structural)
                 if name not in works:
                     scenario = self._structured(structural)
                     works[name] = scenario, self._work(scenario)
@@ -322,7 +323,7 @@ class Plan:
             elif axis.tie in chosen:
                 place = chosen[axis.tie]
                 other = next(item for item in self._outer if item.key == axis.tie)
-                constants[axis.key] = axis.values[place] if axis.values else axis.factor * other.values[place]
+                constants[axis.key] = _tied_value(axis, other.values[place], place)
         return {key: float(value) if key in self._numeric else value for key, value in constants.items()}
 
     def _structured(self, structural: Mapping[str, Any]) -> Scenario:
@@ -359,11 +360,9 @@ class Plan:
         """The numeric keys of a run whose free axes stand at the given values."""
         probe = {}
         for axis in self.sweep.axes:
-            value, place = at[axis.tie or axis.key]
-            if axis.kind == "tie":
-                value = axis.values[place] if axis.values else axis.factor * value
             if axis.key in self._numeric:
-                probe[axis.key] = float(value)
+                value, place = at[axis.tie or axis.key]
+                probe[axis.key] = float(_tied_value(axis, value, place) if axis.kind == "tie" else value)
         return probe
 
     # Drawing
@@ -421,9 +420,10 @@ class Plan:
         label = f"vary.{axis.key}"
         expected = f"expected {number_text(key.bounds, key.unit)}"
         values = axis.values or (source.values if axis.kind == "tie" else ())
-        if any(isinstance(value, bool) or not isinstance(value, int | float) for value in values):
-            return [Problem(self.sweep.source, label, expected, given_text(list(values)))]
-        reach = values or source.span
+        try:
+            reach = tuple(map(double, values)) or source.span
+        except (TypeError, ValueError) as error:
+            return [Problem(self.sweep.source, label, f"{expected} ({error})", given_text(list(values)))]
         if source.kind == "normal" and not values:
             mean, deviation = source.span
             reach = (mean - _DEVIATIONS * deviation, mean + _DEVIATIONS * deviation)
@@ -461,6 +461,13 @@ class Plan:
             text = "no number that runs of one kernel may differ in: expected { values = [...] } or { each = [...] }"
             return [Problem(self.sweep.source, label, text, given_text(axis.as_toml()))]
         return []
+
+
+def _tied_value(axis: Axis, value: Any, place: int) -> Any:
+    """What a tied key is where the other stands at `value`, which need be no number, in its place of its values."""
+    if axis.values:
+        return axis.values[place]
+    return value if axis.factor == 1.0 else axis.factor * value
 
 
 def _grid_values(axis: Axis) -> Floats:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from hashlib import sha256
 from typing import Any
 
 import pyarrow as pa
 
+from springline.codegen.manifest import canonical_json
 from springline.runner import sampling
 from springline.runner.checking import resolve
 from springline.runner.dataset import Dataset
@@ -27,28 +29,35 @@ def stored_plan(dataset: Dataset) -> Plan:
     stored = dataset.description()
     dataset.expect_format(stored)
     name = dataset.place.name
-    if stored.get("sampler") != sampling.VERSION:
+    if repr(stored.get("sampler")) != repr(sampling.VERSION):
         text = f"was drawn by another version of the sampler: expected {sampling.VERSION}"
         raise InputError(Problem(f"{name}/sweep.json", "sampler", text, str(stored.get("sampler"))[:20]))
     try:
+        for file, entry in stored["tables"].items():
+            _expect_table(dataset, file, entry["sha256"])
         scenario = _scenario(dataset, stored["scenario"])
         sweep = sweep_from_json(stored["sweep"], stored["chunk"], scenario, f"{name}/sweep.json")
         kept = {path: f"{TABLES}/{file}" for file, entry in stored["tables"].items() for path in entry["paths"]}
         plan = Plan(replace(sweep, source=name, axes=tuple(_found(axis, kept) for axis in sweep.axes)))
-        groups = [(group["first"], group["runs"]) for group in stored["groups"]]
-        told = (stored["runs"], stored["chunks"], groups, {f: entry["sha256"] for f, entry in stored["tables"].items()})
+        told = [stored["runs"], stored["chunks"], [[group["first"], group["runs"]] for group in stored["groups"]]]
+        if canonical_json(told) != canonical_json([plan.runs, plan.chunks, [[g.first, g.runs] for g in plan.groups]]):
+            raise ValueError("its numbers of runs, chunks and groups do not fit each other")
     except InputError:  # a ValueError too, but one that says already what is wrong
         raise
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise dataset.damaged(repr(error)) from error
-    tables = {file: kept.record.sha256 for file, kept in plan.tables.items()}
-    if tables != told[3]:
-        text = "is not what the runs have read: they cannot be replayed, but batch --resume brings it back"
-        wrong = next(file for file in sorted({*tables, *told[3]}) if tables.get(file) != told[3].get(file))
-        raise InputError(Problem(f"{name}/{TABLES}/{wrong}", "", text))
-    if told[:3] != (plan.runs, plan.chunks, [(group.first, group.runs) for group in plan.groups]):
-        raise dataset.damaged("its numbers of runs, chunks and groups do not fit each other")
+        raise dataset.damaged(error) from error
     return plan
+
+
+def _expect_table(dataset: Dataset, file: str, digest: str) -> None:
+    """Raise InputError unless a table that the dataset keeps is what its runs have read."""
+    try:
+        content = dataset.place.read(f"{TABLES}/{file}")
+    except FileNotFoundError:
+        content = b""
+    if sha256(content).hexdigest() != digest:
+        text = "is not what the runs have read: springline batch --resume, with the sweep's own, brings it back"
+        raise InputError(Problem(f"{dataset.place.name}/{TABLES}/{file}", "", text))
 
 
 def _scenario(dataset: Dataset, text: str) -> Scenario:

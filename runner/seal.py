@@ -108,7 +108,7 @@ def content_hash(table: pa.Table) -> str:
             digest.update(np.array([len(text) for text in texts], dtype="<i8").tobytes())
             digest.update(b"".join(texts))
         elif pa.types.is_boolean(field.type):
-            digest.update(compute.cast(column.fill_null(value=False), pa.uint8()).to_numpy().tobytes())
+            digest.update(compute.cast(column.fill_null(fill_value=False), pa.uint8()).to_numpy().tobytes())
         elif field.type in (pa.float64(), pa.int64()):
             values = column.fill_null(0).to_numpy()
             digest.update(np.ascontiguousarray(values, values.dtype.newbyteorder("<")).tobytes())
