@@ -37,7 +37,10 @@ class Seal:
 
     def close(self, table: pa.Table) -> bytes:
         """The file of `table`, sealed."""
-        told = {_SWEEP: self.sweep, _RUNS: self._runs_text, _CONTENT: content_hash(table)}
+        return self._closed(table, content_hash(table))
+
+    def _closed(self, table: pa.Table, content: str) -> bytes:
+        told = {_SWEEP: self.sweep, _RUNS: self._runs_text, _CONTENT: content}
         return parquet_bytes(table.replace_schema_metadata(told))
 
     def open(self, file: Any, schema: pa.Schema, rows: int | None = None) -> Opened:
@@ -48,14 +51,14 @@ class Seal:
         """
         content = file.read()
         try:
-            footer = parquet.read_metadata(io.BytesIO(content))
+            stored = parquet.ParquetFile(io.BytesIO(content))
             # Before anything is decoded: what is not ours may be of any size.
-            if not footer.schema.to_arrow_schema().remove_metadata().equals(schema, check_metadata=True):
+            if not stored.schema_arrow.remove_metadata().equals(schema, check_metadata=True):
                 return Opened(None, "has other columns than the runs of this sweep")
-            if rows not in (None, footer.num_rows):
-                return Opened(None, f"has {footer.num_rows} rows, expected {rows}")
+            if rows not in (None, stored.metadata.num_rows):
+                return Opened(None, f"has {stored.metadata.num_rows} rows, expected {rows}")
             # One thread: a column of a part is too little for more, and each would keep memory of its own.
-            table = parquet.read_table(io.BytesIO(content), use_threads=False)
+            table = stored.read(use_threads=False)
             table.validate(full=True)
             told = table.schema.metadata or {}
             table = table.replace_schema_metadata(None)
@@ -68,7 +71,7 @@ class Seal:
             return Opened(table, "is of another sweep")
         if told.get(_CONTENT, b"") != found.encode():
             return Opened(table, "has content that is not what was written (its SHA-256 differs)")
-        sound = self.close(table)
+        sound = self._closed(table, found)
         return Opened(table, "", b"" if sound == content else sound)
 
 
