@@ -71,8 +71,8 @@ class Place(Protocol):
         """Names of the files in a folder, sorted; none if there is no such folder."""
         ...
 
-    def folders(self) -> list[str]:
-        """Names of the folders in the place, where it has folders."""
+    def folders(self, folder: str = "") -> list[str]:
+        """Names of the folders in a folder, where there are folders."""
         ...
 
     def free(self) -> int | None:
@@ -145,9 +145,10 @@ class Folder:
         except OSError as error:
             raise _unusable(self.name, error) from error
 
-    def folders(self) -> list[str]:
+    def folders(self, folder: str = "") -> list[str]:
         """Names of the folders in the folder."""
-        return sorted(item.name for item in self._path.iterdir() if item.is_dir()) if self._path.is_dir() else []
+        path = self._path / folder
+        return sorted(item.name for item in path.iterdir() if item.is_dir()) if path.is_dir() else []
 
     def free(self) -> int | None:
         """Bytes that are free in the file system of the folder, or of the one that it will be made in."""
@@ -234,7 +235,7 @@ class Remote:
             return []
         return sorted(item["name"].rstrip("/").rpartition("/")[2] for item in items if item["type"] == "file")
 
-    def folders(self) -> list[str]:
+    def folders(self, folder: str = "") -> list[str]:
         """None: object stores have no folders, and what stands in for them is in nobody's way."""
         return []
 
@@ -421,7 +422,8 @@ class Dataset:
         checked  called with the number of parts that were checked, and how many there are
         Raises InputError if a folder is in the way of a part.
         """
-        blocked = [name for name in self.place.folders() if name == DESCRIPTION or _PART_NAME.fullmatch(name)]
+        blocked = [name for name in self.place.folders() if _PART_NAME.fullmatch(name)]
+        blocked += [f"{TRAJECTORIES}/{name}" for name in self.place.folders(TRAJECTORIES)]
         if blocked:
             text = "is a folder where a file of the dataset belongs: move it away"
             raise InputError(Problem(f"{self.place.name}/{blocked[0]}", "", text))

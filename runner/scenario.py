@@ -204,9 +204,11 @@ class Scenario:
         keys = _numeric_keys(self.structure())
         numbers: dict[str, float | Floats] = dict(self._numbers)
         checked = self.columns_for(columns)
-        lengths = {name: len(column) for name, column in checked.items()}
-        if len(set(lengths.values())) > 1:
-            raise InputError(Problem(self.source, "", "expected columns of one length", str(lengths)))
+        runs = len(next(iter(checked.values()), ()))
+        text = "expected a column of numbers, one for each run, as long as the others"
+        other = [(name, len(column)) for name, column in checked.items() if len(column) != runs]
+        if other:
+            raise InputError(*(Problem(self.source, name, text, f"{count} numbers") for name, count in other))
         for name, column in checked.items():
             for leaf in keys[name].leaves:
                 if leaf.startswith("plant."):  # a value and a factor exclude each other

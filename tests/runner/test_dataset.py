@@ -174,13 +174,16 @@ def test_kept_trajectories_are_checked_and_made_again_too(write: Callable[..., P
     assert [name.read_bytes() for name in names] == whole
 
 
-def test_a_folder_in_the_place_of_a_part_is_the_users_to_move(write: Callable[..., Path], tmp_path: Path) -> None:
-    folder = tmp_path / "data"
-    run(write(), folder)
-    (folder / "part-000004.parquet").unlink()
-    (folder / "part-000004.parquet").mkdir()
-    with pytest.raises(InputError, match=r"part-000004\.parquet: is a folder where a file of the dataset belongs"):
-        batch(str(write()), output=str(folder), resume=True)
+@pytest.mark.parametrize("name", ["part-000004.parquet", "trajectories/run-000000128.parquet"])
+def test_a_folder_in_the_place_of_a_file_is_the_users_to_move(
+    write: Callable[..., Path], tmp_path: Path, name: str
+) -> None:
+    sweep, folder = write(change=("[set]", "[keep]\ntrajectories = 128\n[set]")), tmp_path / "data"
+    run(sweep, folder)
+    (folder / name).unlink()
+    (folder / name).mkdir()
+    with pytest.raises(InputError, match=f"{name}: is a folder where a file of the dataset belongs"):
+        batch(str(sweep), output=str(folder), resume=True)
 
 
 def test_each_part_is_read_once_for_check_and_end(
