@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen import toolchain
+from springline.codegen.doubles import doubles
 from springline.codegen.kernel_source import ONE_RUN, Engine, KernelOptions, KernelSource, print_kernel
 from springline.codegen.memory import memory
 from springline.codegen.numbers import real, shown, whole
@@ -258,17 +259,17 @@ class Kernel:
         """Simulate one run per row of `parameters` (runs, len(self.parameters)), in this thread, without the GIL.
 
         Raises ValueError if `parameters` or `tables` do not have the shape the kernel was built for, and for results
-        that this machine's memory cannot hold.
+        that this machine's memory cannot hold; TypeError or ValueError for numbers that are no doubles.
         """
-        parameters = np.ascontiguousarray(parameters, dtype=np.float64)
-        runs = len(parameters)
+        parameters = doubles(parameters)
+        runs = len(parameters) if parameters.ndim else 0
         if parameters.shape != (runs, len(self.parameters)):
             raise ValueError(f"parameters have shape {parameters.shape}, expected (runs, {len(self.parameters)})")
         layouts: Sequence[TableLayout] = self.program.system.tables
         if len(tables) != len(layouts):
             raise ValueError(f"{len(tables)} tables given, the system has {len(layouts)}")
         c_tables = (_Table * max(len(tables), 1))()
-        coefficients = [np.ascontiguousarray(table.coefficients, dtype=np.float64) for table in tables]
+        coefficients = [doubles(table.coefficients) for table in tables]
         for i, (table, layout, data) in enumerate(zip(tables, layouts, coefficients, strict=True)):
             if data.shape[1:] != (len(layout.channels), 4):
                 raise ValueError(

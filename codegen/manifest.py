@@ -10,11 +10,11 @@ import hashlib
 import json
 import math
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, NamedTuple
+
+from springline.codegen.unfinished import remove_leftovers, workplace
 
 MANIFEST = "manifest.json"
 
@@ -81,6 +81,8 @@ def write_tree(
     writes = [path for path, content in new.items() if _content(folder, path) != content]
     if writes or removals:
         _replace(folder, {path: new[path] for path in writes}, removals)
+    else:
+        remove_leftovers(folder)
     return Changes(tuple(writes), tuple(removals))
 
 
@@ -132,7 +134,7 @@ def read_manifest(folder: Path, kind: object) -> dict[str, Any] | None:
     try:
         manifest: dict[str, Any] = json.loads(content)
         listed = {entry["path"]: entry["sha256"] for entry in manifest["files"]}
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None
     # A manifest may come from elsewhere, and what it lists may be removed: no path of it leads outside.
     if not all(isinstance(path, str) and _stays_inside(path) for path in listed):
@@ -211,7 +213,7 @@ def _content(folder: Path, path: str) -> bytes | None:
 
 def _stays_inside(path: str) -> bool:
     pure = PurePosixPath(path)
-    return str(pure) == path and path != "." and not pure.is_absolute() and ".." not in pure.parts
+    return str(pure) == path != "." and path.isprintable() and not pure.is_absolute() and ".." not in pure.parts
 
 
 def _sha256(content: bytes) -> str:
@@ -227,32 +229,31 @@ def _replace(folder: Path, writes: Mapping[str, bytes], removals: Sequence[str])
     A process killed half-way leaves files that are old or new as a whole; the next write accepts both.
     """
     folder = folder.resolve()
-    with contextlib.ExitStack() as undo:
+    with contextlib.ExitStack() as above:
         for place in (*reversed(folder.parents), folder):
-            _make_folder(place, undo)
+            _make_folder(place, above)
         # Inside the folder, for only there is it surely the same file system (the folder may be a mount).
-        work = Path(tempfile.mkdtemp(prefix=".springline-", dir=folder))
-        undo.callback(shutil.rmtree, work)
-        prepared, replaced = work / "new", work / "old"
-        for path, content in writes.items():
-            (prepared / path).parent.mkdir(parents=True, exist_ok=True)
-            with (prepared / path).open("wb") as stream:
-                stream.write(content)
-                stream.flush()
-                os.fsync(stream.fileno())
-        for path in (*removals, *writes):
-            target, old = folder / path, replaced / path
-            for inner in reversed(PurePosixPath(path).parents):
-                _make_folder(folder / inner, undo)
-            if target.exists():
-                old.parent.mkdir(parents=True, exist_ok=True)
-                os.replace(target, old)
-                undo.callback(os.replace, old, target)
-            if path in writes:
-                os.replace(prepared / path, target)
-                undo.callback(target.unlink)
-        undo.pop_all()
-    shutil.rmtree(work)
+        with workplace(folder) as work, contextlib.ExitStack() as undo:
+            prepared, replaced = work / "new", work / "old"
+            for path, content in writes.items():
+                (prepared / path).parent.mkdir(parents=True, exist_ok=True)
+                with (prepared / path).open("wb") as stream:
+                    stream.write(content)
+                    stream.flush()
+                    os.fsync(stream.fileno())
+            for path in (*removals, *writes):
+                target, old = folder / path, replaced / path
+                for inner in reversed(PurePosixPath(path).parents):
+                    _make_folder(folder / inner, undo)
+                if target.exists():
+                    old.parent.mkdir(parents=True, exist_ok=True)
+                    os.replace(target, old)
+                    undo.callback(os.replace, old, target)
+                if path in writes:
+                    os.replace(prepared / path, target)
+                    undo.callback(target.unlink)
+            undo.pop_all()
+        above.pop_all()
     _remove_empty_folders(folder, removals)
 
 
@@ -284,18 +285,35 @@ def _plain(value: Any) -> Any:
 
 
 def _line_difference(old: bytes, new: bytes) -> str:
-    old_lines, new_lines = old.splitlines(), new.splitlines()
-    different = sum(a != b for a, b in zip(old_lines, new_lines, strict=False))
-    different += abs(len(old_lines) - len(new_lines))
-    return f"{different} of {len(new_lines)} lines would change"
+    """How many lines would come and go, counted as diff does: no order of the common lines keeps more of them."""
+    old_lines, new_lines = old.splitlines(keepends=True), new.splitlines(keepends=True)
+    kept = _longest_common(old_lines, new_lines)
+    return f"{len(new_lines) - kept} of {len(new_lines)} lines are new, {len(old_lines) - kept} go"
+
+
+def _longest_common(old: Sequence[bytes], new: Sequence[bytes]) -> int:
+    """Length of the longest common subsequence.
+
+    One bit a line of `old`, as in Hyyrö, "Bit-parallel LCS-length computations revisited" (2004): a table of thousands
+    by thousands of lines would take seconds.
+    """
+    places: dict[bytes, int] = {}
+    for k, line in enumerate(old):
+        places[line] = places.get(line, 0) | 1 << k
+    every = (1 << len(old)) - 1
+    left = every
+    for line in new:
+        matched = left & places.get(line, 0)
+        left = (left + matched | left - matched) & every
+    return len(old) - left.bit_count()
 
 
 def _manifest_difference(old: bytes, new: bytes) -> str:
     """Which entries of the manifest differ, named by keys and by the ``name`` of list items."""
     try:
         found = [text for text in _differences(json.loads(old), json.loads(new)) if text]
-    except ValueError:
-        return "is no JSON"
+    except (ValueError, RecursionError):
+        return "is no manifest"
     shown = found[:5] + ([f"and {len(found) - 5} more"] if len(found) > 5 else [])
     return "; ".join(shown) or "is written in another form"
 
@@ -322,6 +340,6 @@ def _differences(old: Any, new: Any, where: str = "") -> Iterator[str]:
 
 
 def _by_name(value: Any) -> Any:
-    if isinstance(value, list) and value and all(isinstance(item, dict) and "name" in item for item in value):
+    if isinstance(value, list) and all(isinstance(item, dict) and isinstance(item.get("name"), str) for item in value):
         return {item["name"]: item for item in value}
     return value

@@ -16,6 +16,7 @@ import json
 import os
 import shlex
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
@@ -36,6 +37,9 @@ _NO_COMPILER = (
     "no C compiler found: install one from your system (Debian, Ubuntu: apt-get install gcc libc6-dev; "
     "Fedora: dnf install gcc; macOS: xcode-select --install) or run: pip install 'springline[compiler]'"
 )
+
+
+_ANOTHER_FOLDER = "set SPRINGLINE_CACHE to a folder of yours that can be written to"
 
 
 class ToolchainError(RuntimeError):
@@ -81,7 +85,13 @@ def find_compiler() -> Compiler:
 def _find_compiler(cc: str, path: str) -> Compiler:
     # `path` is a cache key only: after a change of $PATH the search starts again.
     if cc:
-        compiler = probe_compiler(shlex.split(cc))
+        try:
+            words = shlex.split(cc)
+        except ValueError as error:  # a quotation mark that is not closed
+            raise ToolchainError(
+                f"the environment variable CC is {cc!r}, which is no command line ({error}): correct or unset it"
+            ) from error
+        compiler = probe_compiler(words)
         if compiler is None:
             raise ToolchainError(
                 f"the environment variable CC is {cc!r}, which is no working C compiler: correct or unset it"
@@ -99,7 +109,7 @@ def _find_compiler(cc: str, path: str) -> Compiler:
 
 def probe_compiler(argv: Sequence[str]) -> Compiler | None:
     """The compiler called by `argv`; None where there is none or it does not find the C library's headers."""
-    program = shutil.which(argv[0])
+    program = shutil.which(argv[0]) if argv else None
     if program is None:
         return None
     call = (os.path.abspath(program), *argv[1:])
@@ -108,11 +118,15 @@ def probe_compiler(argv: Sequence[str]) -> Compiler | None:
         target = _call([*call, "-dumpmachine"]).stdout.strip()
     except ToolchainError:
         return None
-    if "ziglang" in call or Path(program).name.startswith("zig"):
+    if _is_zig(call):
         family: Family = "zig"
     else:
         family = "clang" if "__clang__" in macros else "gcc"
     return Compiler(call, family, macros.get("__VERSION__", "unknown").strip('" '), target)
+
+
+def _is_zig(argv: Sequence[str]) -> bool:
+    return "ziglang" in argv or Path(argv[0]).name.startswith("zig")
 
 
 def predefined_macros(compiler: Compiler, flags: Sequence[str] = ()) -> Mapping[str, str]:
@@ -157,12 +171,20 @@ def native_vector_width(compiler: Compiler | None = None) -> int:
 
 
 def cache_root() -> Path:
-    """$SPRINGLINE_CACHE, else $XDG_CACHE_HOME/springline, else ~/.cache/springline."""
+    """$SPRINGLINE_CACHE, else $XDG_CACHE_HOME/springline, else ~/.cache/springline.
+
+    Raises ToolchainError where none of them is set and the user has no home.
+    """
     own = os.environ.get("SPRINGLINE_CACHE")
     if own:
         return Path(own).absolute()
     shared = os.environ.get("XDG_CACHE_HOME")
-    return (Path(shared) if shared else Path.home() / ".cache").absolute() / "springline"
+    try:
+        return (Path(shared) if shared else Path.home() / ".cache").absolute() / "springline"
+    except RuntimeError as error:  # no HOME, and the user database does not know this user
+        raise ToolchainError(
+            f"no folder for compiled libraries: you have no home here ({error}); {_ANOTHER_FOLDER}"
+        ) from error
 
 
 def build_library(
@@ -182,28 +204,32 @@ def build_library(
     Warnings are errors. The same input gives the same bytes wherever it is built: names are relative, and
     the folder it was built in is not recorded. Any number of threads and processes may ask at once.
 
-    Raises ToolchainError with the command and the compiler's first lines if it fails, ValueError if a file
-    name leaves the folder or `main` is not among the sources.
+    What is in the cache is code that will run here: a folder that others own or may write to is not trusted, and
+    a library comes into it only after another process has loaded it.
+
+    Raises ToolchainError with the command and the compiler's first lines if it fails, or with the remedy where the
+    cache cannot be used; ValueError if a file name leaves the folder or `main` is not among the sources.
     """
     compiler = compiler or find_compiler()
     content = _checked_sources(sources, main)
     command = _command(compiler, main, flags)
+    root = cache_root()
+    entry = root / _cache_key(compiler, content, command)
+    library = entry / _LIBRARY
     try:
-        entry = cache_root() / _cache_key(compiler, content, command)
-        library = entry / _LIBRARY
-        if _intact(entry):
+        _expect_trusted(root, entry)
+        if _intact(entry) and _loads(library):
             return library
-        entry.mkdir(parents=True, exist_ok=True)
+        for folder in (root, entry):
+            folder.mkdir(mode=0o755, parents=True, exist_ok=True)  # whatever the umask allows others
         with _locked(entry / "lock") as exclusive:
             if exclusive:  # whatever lies here is of a build that was killed
                 for leftover in entry.glob("build-*"):
                     shutil.rmtree(leftover, ignore_errors=True)
-            if not _intact(entry):
-                _build(entry, content, command)
+            if not (_intact(entry) and _loads(library)):
+                _build(entry, content, command, compiler)
     except OSError as error:
-        raise ToolchainError(
-            f"cannot use the cache folder {cache_root()} ({error}): make it writable or set SPRINGLINE_CACHE"
-        ) from error
+        raise ToolchainError(f"cannot use the cache folder {root} ({error}): {_ANOTHER_FOLDER}") from error
     return library
 
 
@@ -213,6 +239,38 @@ def load(library: Path) -> ctypes.CDLL:
         return ctypes.CDLL(os.fspath(library))
     except OSError as error:
         raise ToolchainError(f"cannot load the compiled library: {error}") from error
+
+
+def _expect_trusted(root: Path, entry: Path) -> None:
+    """Raise ToolchainError if anybody but this user and root may put a library where the cache would find it."""
+    me = os.geteuid()
+    for place in (root, entry, entry / _LIBRARY):
+        try:
+            found = place.stat()
+        except FileNotFoundError:
+            return
+        if place != entry / _LIBRARY and not stat.S_ISDIR(found.st_mode):
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(place))
+        if found.st_uid not in (me, 0):
+            raise ToolchainError(
+                f"the cache would run the code of another user: {place} belongs to user {found.st_uid}, and you are "
+                f"user {me}; {_ANOTHER_FOLDER}"
+            )
+        if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            raise ToolchainError(
+                f"the cache would run what others may have written: {place} has mode "
+                f"{stat.S_IMODE(found.st_mode):04o}; take their right away, chmod -R go-w {shlex.quote(str(root))}, "
+                f"or {_ANOTHER_FOLDER}"
+            )
+
+
+def _loads(library: Path) -> bool:
+    """Whether a library with a right checksum can be loaded; this process needs it loaded anyway."""
+    try:
+        load(library)
+    except ToolchainError:
+        return False
+    return True
 
 
 def _checked_sources(sources: Mapping[str, str | bytes], main: str) -> dict[str, bytes]:
@@ -284,7 +342,7 @@ def _locked(path: Path) -> Iterator[bool]:
             yield True
 
 
-def _build(entry: Path, content: Mapping[str, bytes], command: Sequence[str]) -> None:
+def _build(entry: Path, content: Mapping[str, bytes], command: Sequence[str], compiler: Compiler) -> None:
     with tempfile.TemporaryDirectory(prefix="build-", dir=entry) as folder:
         work = Path(folder)
         for name, text in content.items():
@@ -292,18 +350,60 @@ def _build(entry: Path, content: Mapping[str, bytes], command: Sequence[str]) ->
             (work / name).write_bytes(text)
         _call([*command, f"-ffile-prefix-map={work}=."], cwd=work)
         library = work / _LIBRARY
+        _expect_loadable(library, compiler)
         checksum = work / _CHECKSUM
         checksum.write_text(hashlib.sha256(library.read_bytes()).hexdigest(), encoding="ascii")
         for file in (library, checksum):  # a reader in between sees a mismatch and comes to the lock
+            file.chmod(stat.S_IMODE(file.stat().st_mode) & ~(stat.S_IWGRP | stat.S_IWOTH))
             with file.open("rb+") as stream:
                 os.fsync(stream.fileno())
             os.replace(file, entry / file.name)
 
 
+def _expect_loadable(library: Path, compiler: Compiler) -> None:
+    """Raise ToolchainError, with the remedy, for a library that does not load.
+
+    It is loaded by another process first: what a broken compiler writes may crash the one that loads it.
+    """
+    program = "import ctypes, sys; ctypes.CDLL(sys.argv[1])"
+    if not library.is_file():
+        said = "it wrote no file"
+    else:
+        argv = [sys.executable, "-I", "-S", "-c", program, str(library)]
+        done = subprocess.run(argv, check=False, capture_output=True, text=True, errors="replace")
+        if done.returncode == 0:
+            return
+        last = done.stderr.strip().splitlines()[-1:] or [f"loading it ends with code {done.returncode}"]
+        said = last[0].removeprefix("OSError: ").replace(str(library), library.name)
+        ours, its = _machine(Path(sys.executable)), _machine(library)
+        if ours and its and ours != its:
+            raise ToolchainError(
+                f"{shlex.join(compiler.argv)} makes code for another machine than this one (its target is "
+                f"{compiler.target}): set CC to a compiler for this machine ({said})"
+            )
+        if os.statvfs(library).f_flag & getattr(os, "ST_NOEXEC", 0):
+            raise ToolchainError(
+                f"no library can be loaded from the cache folder {cache_root()}, for its file system is mounted "
+                f"noexec: set SPRINGLINE_CACHE to a folder elsewhere ({said})"
+            )
+    raise ToolchainError(
+        f"{shlex.join(compiler.argv)} reported success, but what it wrote is no library for this machine ({said}): "
+        "repair it, or set CC to another compiler"
+    )
+
+
+def _machine(image: Path) -> bytes:
+    """Word size, byte order and processor that an ELF file is for; b"" for any other file."""
+    with image.open("rb") as stream:
+        header = stream.read(20)
+    return header[4:6] + header[18:20] if len(header) == 20 and header.startswith(b"\x7fELF") else b""
+
+
 def _call(argv: Sequence[str], *, cwd: Path | None = None, stdin: str = "") -> subprocess.CompletedProcess[str]:
     """Run a compiler. Raises ToolchainError with the command and the first lines of its messages."""
     environment = dict(os.environ, LC_ALL="C")
-    environment.setdefault("ZIG_GLOBAL_CACHE_DIR", str(cache_root() / "zig"))
+    if _is_zig(argv):
+        environment.setdefault("ZIG_GLOBAL_CACHE_DIR", str(cache_root() / "zig"))
     try:
         done = subprocess.run(
             argv,
@@ -330,19 +430,24 @@ def _call(argv: Sequence[str], *, cwd: Path | None = None, stdin: str = "") -> s
 
 def checks() -> list[Check]:
     """The state of the toolchain: compiler, vector width, cache, and whether a library builds and loads."""
-    root = cache_root()
+    try:
+        cache = Check("cache", str(cache_root()), True)
+    except ToolchainError as error:
+        cache = Check("cache", str(error), False)
     try:
         compiler = find_compiler()
     except ToolchainError as error:
-        return [Check("C compiler", str(error), False), Check("cache", str(root), True)]
+        return [Check("C compiler", str(error), False), cache]
     rows = [
         Check("C compiler", shlex.join(compiler.argv), True),
         Check("compiler version", f"{compiler.family} {compiler.version}", True),
         Check("target", compiler.target, True),
         Check("native flags", shlex.join(native_flags(compiler)) or "(none)", True),
         Check("vector width", f"{native_vector_width(compiler)} doubles", True),
-        Check("cache", str(root), True),
+        cache,
     ]
+    if not cache.ok:
+        return rows
     source = "int springline_probe(int x);\nint springline_probe(int x) { return x + 1; }\n"
     try:
         library = load(build_library({"probe.c": source}, main="probe.c", compiler=compiler))

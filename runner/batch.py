@@ -25,8 +25,9 @@ import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
 from springline.codegen.kernel import Control, Runs, joined
+from springline.codegen.memory import memory
 from springline.codegen.toolchain import ToolchainError
-from springline.runner.dataset import Dataset
+from springline.runner.dataset import Dataset, Place
 from springline.runner.dotted import expect_keys
 from springline.runner.errors import InputError, Problem
 from springline.runner.plan import Chunk, Columns, Group, Plan
@@ -46,6 +47,8 @@ _ANSWER = "10s"  # for a scheduler to answer
 _CALIBRATION_STEPS = 2000
 _TIMED = 3
 _CHUNKS_PER_THREAD = 8
+_FOOTER = 600  # bytes per column of a Parquet file, for what is said of it
+_COMPRESSION = 3  # the most that tables of mostly doubles have been seen to shrink
 
 
 # --- where runs are simulated ----------------------------------------------------------------------------
@@ -223,7 +226,7 @@ Report = Callable[[Tally, int], None]
 def run_sweep(
     plan: Plan, dataset: Dataset, pool: Pool, done: set[int], report: Report = lambda tally, steps: None
 ) -> Tally:
-    """Simulate every chunk of the plan that is not among `done`, and store it.
+    """Simulate every chunk of the plan whose number is not among `done`, store it, and add its number.
 
     A chunk that fails (its worker died, the disk refuses) is tried three times, then given up, and the rest goes on,
     unless three chunks in a row were given up. Raises ToolchainError where the kernel cannot be compiled.
@@ -263,6 +266,7 @@ def run_sweep(
             else:
                 problem = _store(plan, dataset, chunk, columns, outcome)
                 if problem is None:
+                    done.add(chunk.number)
                     tally.done += chunk.runs
                     tally.diverged += int(np.count_nonzero(outcome.runs.status))
             tally.steps += chunk.runs * chunk.group.work.settings.steps
@@ -345,13 +349,41 @@ def _seconds_per_step(plan: Plan, group: Group) -> float:
 
 def dataset_bytes(plan: Plan) -> int:
     """About how large the dataset will be: doubles hardly compress, and every part and trajectory has a footer."""
-    footer = 600 * len(plan.schema)
-    size = plan.runs * 8 * len(plan.schema) + plan.chunks * footer
-    if plan.sweep.keep:
-        group = plan.groups[0].work
-        rows, columns = group.settings.rows, len(trajectory_schema(group.system))
-        size += -(-plan.runs // plan.sweep.keep) * (8 * rows + 600) * columns
+    columns = len(plan.schema)
+    size = plan.runs * 8 * columns + plan.chunks * _FOOTER * columns
+    for group in plan.groups if plan.sweep.keep else ():
+        kept = -(-group.runs // plan.sweep.keep)
+        size += kept * (8 * group.work.settings.rows + _FOOTER) * len(trajectory_schema(group.work.system))
     return size
+
+
+def refuse_oversized(plan: Plan, where: Place, threads: int, left: int | None = None) -> None:
+    """Raise InputError for a sweep that needs more memory or room than there is.
+
+    threads, left  as for `estimate`
+    Only what is certain is refused: a table may compress to a third of its size, and a chunk's trajectories are held
+    at least twice, as the loop writes them and as they are stored.
+    """
+    source = plan.sweep.source
+    for group in plan.groups if plan.sweep.keep else ():
+        runs = min(plan.chunk_size, group.runs)
+        trajectories = min(threads, plan.chunks) * -(-runs // plan.sweep.keep)
+        rows = group.work.settings.rows
+        need = 2 * 8 * trajectories * rows * len(trajectory_schema(group.work.system))
+        if need > memory():
+            text = (
+                f"expected more, a larger simulation.output_every, a smaller chunk or fewer --jobs: {trajectories:,} "
+                f"trajectories of {rows:,} rows at a time take {need:,} bytes, and there are {memory():,} of memory"
+            )
+            raise InputError(Problem(source, "keep.trajectories", text, str(plan.sweep.keep)))
+    free = where.free()
+    share = 1.0 if left is None else left / plan.runs
+    need = int(share * dataset_bytes(plan) / _COMPRESSION)
+    if free is not None and need > free:
+        text = f"has {free:,} bytes free, and the dataset takes {need:,} at least: choose another place with -o"
+        if plan.sweep.keep:
+            text += ", or keep fewer trajectories"
+        raise InputError(Problem(where.name, "", text))
 
 
 # --- from Python -----------------------------------------------------------------------------------------
@@ -373,7 +405,7 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
         raise TypeError(f"jobs is {jobs!r}, expected a whole number or None")
     if jobs is not None and jobs < 1:
         raise ValueError(f"jobs is {jobs}, expected at least 1")
-    arrays = {key: _array(values) for key, values in columns.items()}
+    arrays = scenario.columns_for(columns)
     lengths = {key: len(values) for key, values in arrays.items()}
     if len(set(lengths.values())) != 1 or 0 in lengths.values():
         text = "the columns of a batch must be non-empty arrays of one length"
@@ -385,14 +417,6 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
     for position, (key, array) in enumerate(arrays.items()):
         result = result.add_column(position, unit_field(key, keys[key].unit), pa.array(array, pa.float64()))
     return result.add_column(0, unit_field("run", "", pa.int64()), pa.array(np.arange(runs)))
-
-
-def _array(values: ArrayLike) -> NDArray[Any]:
-    """A column as an array of what it holds; whether these are numbers is checked with their bounds."""
-    try:
-        return np.atleast_1d(np.asarray(values))
-    except ValueError:  # lists of different lengths
-        return np.asarray(values, dtype=object)
 
 
 def _over_threads(work: Work, parameters: Floats, jobs: int | None) -> Runs:

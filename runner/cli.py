@@ -8,6 +8,11 @@
 
 from __future__ import annotations
 
+import os
+import re
+import sys
+import traceback
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -18,6 +23,8 @@ from springline.codegen.toolchain import ToolchainError
 from springline.runner.commands import batch, bench, doctor, fmu, generate, listing, reproduce, run
 from springline.runner.errors import InputError
 from springline.runner.terminal import complain, say, version
+
+_TRACEBACK = "SPRINGLINE_TRACEBACK"
 
 
 class Commands(TyperGroup):
@@ -35,9 +42,23 @@ class Commands(TyperGroup):
         except (ToolchainError, OSError) as error:
             complain(f"Error: {error}")
             raise typer.Exit(1) from error
+        except MemoryError as error:
+            complain("Error: there is not enough memory for this")
+            raise typer.Exit(1) from error
         except KeyboardInterrupt as error:
             complain("stopped")
             raise typer.Exit(130) from error
+        except Exception as error:
+            if isinstance(error, typer.Abort) or hasattr(error, "exit_code"):  # typer's own, told by typer
+                raise
+            if os.environ.get(_TRACEBACK):
+                raise
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            complain(
+                f"Error: a fault of springline itself: {type(error).__name__}: {error} ({Path(place.filename).name}, "
+                f"line {place.lineno}). Please report it; {_TRACEBACK}=1 shows how it came to that."
+            )
+            raise typer.Exit(1) from error
 
 
 app = typer.Typer(
@@ -83,4 +104,42 @@ def springline(
 
 def main() -> None:
     """Entry point of the `springline` command."""
-    app(prog_name="springline")
+    _open_streams()
+    _mend_environment()
+    code: Any = 0
+    try:
+        try:
+            app(prog_name="springline")
+        except SystemExit as end:
+            code = end.code
+        sys.stdout.flush()
+    except OSError as error:  # a full disk, or nobody reads any more
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for Python tries again at its end
+        if not code and not isinstance(error, BrokenPipeError):
+            complain(f"Error: cannot write to the standard output: {error}")
+        code = code or 1
+    sys.exit(code)
+
+
+def _mend_environment() -> None:
+    """Take out of the environment what libraries would stumble over."""
+    for name in ("COLUMNS", "LINES"):  # Rich takes for a number whatever has digits, "²" too
+        if not re.fullmatch("[0-9]{1,4}", os.environ.get(name, "0")):
+            del os.environ[name]
+    os.environ["MPLBACKEND"] = "Agg"  # all figures go into files, whatever windows a user's own plots have
+
+
+def _open_streams() -> None:
+    """Make the standard streams ones that anything can be written to.
+
+    Where one was closed, the next file that is opened would take its place, and whoever prints would write into it.
+    """
+    for number, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
+        elif mode == "w":
+            getattr(sys, name).reconfigure(errors="backslashreplace")  # a locale that lacks a character

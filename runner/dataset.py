@@ -2,7 +2,10 @@
 
 A part is there if its chunk is done, so a kill at any moment loses no more than the chunks in flight. Parts come into
 being whole, and their content follows from sweep.json alone: two processes that write the same part, or a write that
-is repeated, do no harm. The lock saves double work; it is not what keeps a dataset sound.
+is repeated, do no harm. The lock saves double work; it is not what keeps a dataset sound. What happens to parts later
+is seen by their seals: one that is damaged, or of other runs, is made again.
+
+tables/ holds the CSV files that the runs read, so that a dataset can be replayed wherever it lies.
 
 The place is a local folder or any URL that fsspec knows ("s3://bucket/name", "memory://name").
 """
@@ -14,31 +17,47 @@ import errno
 import fcntl
 import json
 import os
+import re
+import shutil
 import socket
+import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from functools import cached_property
+from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
 from springline.codegen.manifest import canonical_json
-from springline.runner.errors import InputError, Problem
-from springline.runner.plan import Chunk, Plan
-from springline.runner.storage import TEMPORARY, parquet_bytes, write_file
-from springline.runner.toml_text import value_text
+from springline.codegen.unfinished import TEMPORARY
+from springline.runner.errors import InputError, Problem, unknown
+from springline.runner.plan import FORMAT, Chunk, Plan
+from springline.runner.records import FOLDER as TABLES
+from springline.runner.seal import Opened, Seal
+from springline.runner.simulate import trajectory_schema
+from springline.runner.storage import write_file
+from springline.runner.toml_text import read_toml, value_text
 
 DESCRIPTION = "sweep.json"
 TRAJECTORIES = "trajectories"
 
 _LOCK = ".lock"
 _PART = "part-{:06d}.parquet"
+_PART_NAME = re.compile(r"part-\d{6}\.parquet")
+_TRAJECTORY = "run-{:09d}.parquet"
 # What may differ between the process that began a dataset and the one that resumes it.
 _FREE = ("springline", "versions")
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP)
 _FULL = (errno.ENOSPC, errno.EDQUOT)
+
+
+Tell = Callable[[str], None]
+Tick = Callable[[int, int], None]
 
 
 class Place(Protocol):
@@ -51,6 +70,18 @@ class Place(Protocol):
 
     def names(self, folder: str = "") -> list[str]:
         """Names of the files in a folder, sorted; none if there is no such folder."""
+        ...
+
+    def folders(self, folder: str = "") -> list[str]:
+        """Names of the folders in a folder, where there are folders."""
+        ...
+
+    def free(self) -> int | None:
+        """Bytes that can still be written there, None if nobody can say."""
+        ...
+
+    def local(self) -> Path:
+        """A local folder with the files of `tables`; it lasts as long as the Place."""
         ...
 
     def read(self, name: str) -> bytes:
@@ -77,6 +108,8 @@ class Place(Protocol):
 def place(destination: str | Path) -> Place:
     """The Place of a folder's path or a URL. Raises InputError for a URL that nothing installed can handle."""
     text = str(destination)
+    if "\0" in text:
+        raise InputError(Problem(repr(text), "", "no file or folder can have this name"))
     if "://" not in text or text.startswith("file://"):
         return Folder(Path(text.removeprefix("file://")))
     try:
@@ -112,6 +145,24 @@ class Folder:
             raise InputError(Problem(self.name, "", "is a file: expected a folder for the dataset")) from error
         except OSError as error:
             raise _unusable(self.name, error) from error
+
+    def folders(self, folder: str = "") -> list[str]:
+        """Names of the folders in the folder."""
+        path = self._path / folder
+        return sorted(item.name for item in path.iterdir() if item.is_dir()) if path.is_dir() else []
+
+    def free(self) -> int | None:
+        """Bytes that are free in the file system of the folder, or of the one that it will be made in."""
+        path = self._path.absolute()
+        try:
+            usage = shutil.disk_usage(next(folder for folder in (path, *path.parents) if folder.is_dir()))
+        except OSError:
+            return None
+        return usage.free if usage.total else None  # file systems without a size of their own have no room either
+
+    def local(self) -> Path:
+        """The folder itself."""
+        return self._path.resolve()
 
     def read(self, name: str) -> bytes:
         """Content of a file."""
@@ -166,6 +217,7 @@ class Remote:
         self._url = url
         self._files = files
         self._root = root.rstrip("/")
+        self._copy: tempfile.TemporaryDirectory[str] | None = None
 
     @property
     def name(self) -> str:
@@ -183,6 +235,24 @@ class Remote:
         except FileNotFoundError:
             return []
         return sorted(item["name"].rstrip("/").rpartition("/")[2] for item in items if item["type"] == "file")
+
+    def folders(self, folder: str = "") -> list[str]:
+        """None: object stores have no folders, and what stands in for them is in nobody's way."""
+        return []
+
+    def free(self) -> int | None:
+        """Nobody can say."""
+        return None
+
+    def local(self) -> Path:
+        """A copy of the tables, in a folder that goes with this object."""
+        if self._copy is None:
+            self._copy = tempfile.TemporaryDirectory(prefix="springline-")
+            folder = Path(self._copy.name, TABLES)
+            folder.mkdir()
+            for name in self.names(TABLES):
+                (folder / name).write_bytes(self.read(f"{TABLES}/{name}"))
+        return Path(self._copy.name)
 
     def read(self, name: str) -> bytes:
         """Content of a file."""
@@ -268,59 +338,154 @@ class Dataset:
         A resumed dataset keeps its chunk size. Raises InputError if it holds anything that `plan` would not continue.
         """
         if not self.is_begun(resume=resume):
+            self._keep_tables(plan)
             self.place.write(DESCRIPTION, canonical_json({**versions, **plan.as_json()}))
             return plan
         stored = self.description()
+        self.expect_format(stored)
         chunk = stored.get("chunk")
         if isinstance(chunk, int) and chunk > 0 and plan.sweep.chunk in (0, chunk):
             plan = Plan(plan.sweep, chunk)
         new = json.loads(canonical_json(plan.as_json()))
         try:
             changed = list(changes(_as_written(stored), _as_written(new)))
-        except (KeyError, TypeError, AttributeError, ValueError) as error:
-            raise InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({error!r})")) from error
+        except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
+            raise self.damaged(error) from error
         if changed:
             shown = "\n  ".join(changed[:20])
             text = f"cannot be resumed, for what it holds is not what the sweep asks for now:\n  {shown}"
             raise InputError(Problem(self.place.name, "", text))
-        for folder in ("", TRAJECTORIES):
+        for folder in ("", TRAJECTORIES, TABLES):
             for name in self.place.names(folder):
                 if name.startswith(TEMPORARY):
                     self.place.remove(f"{folder}/{name}" if folder else name)
+        self._keep_tables(plan)
         return plan
+
+    def _keep_tables(self, plan: Plan) -> None:
+        """Copy the CSV files that the runs read, those that are not there as they should be."""
+        there = self.place.names(TABLES)
+        for name, kept in plan.tables.items():
+            path = f"{TABLES}/{name}"
+            if name not in there or self.place.read(path) != kept.record.content:
+                self.place.write(path, kept.record.content)
 
     def description(self) -> dict[str, Any]:
         """Content of sweep.json. Raises InputError if there is none, or it is none."""
         try:
             content = json.loads(self.place.read(DESCRIPTION))
-        except FileNotFoundError as error:
+        except (FileNotFoundError, NotADirectoryError) as error:
             raise InputError(Problem(self.place.name, "", f"holds no dataset: there is no {DESCRIPTION}")) from error
-        except ValueError as error:
-            raise InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({error})")) from error
+        except (ValueError, OSError, RecursionError) as error:
+            raise self.damaged(error) from error
         if not isinstance(content, dict):
-            raise InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", "is damaged (no table)"))
+            raise self.damaged(TypeError())
         return content
+
+    @cached_property
+    def identity(self) -> str:
+        """Hash of what sweep.json says of the runs: all that decides them, and not what made them."""
+        told = {key: value for key, value in self.description().items() if key not in _FREE}
+        return sha256(canonical_json(told)).hexdigest()
+
+    def damaged(self, error: Exception) -> InputError:
+        """The error of a description that cannot be what was written, as reading it has shown."""
+        match error:
+            case KeyError():
+                how = f"there is no {error.args[0]!r}"
+            case RecursionError():
+                how = "brackets in brackets without end"
+            case json.JSONDecodeError() | tomllib.TOMLDecodeError() | OSError():
+                how = str(error)
+            case _:
+                how = "an entry is not what is written there"
+        return InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({how})"))
+
+    def expect_format(self, stored: Mapping[str, Any]) -> None:
+        """Raise InputError unless the dataset was begun by a version that describes and seals it as this one does."""
+        given = stored.get("format", 1)
+        if given != FORMAT:
+            text = (
+                f"was begun by {'an earlier' if given == 1 else 'another'} version of springline "
+                f"({str(stored.get('springline', 'unknown'))[:20]}), whose parts this one cannot check: it can be read "
+                "(read_dataset), but neither continued nor replayed; begin a new one with another -o"
+            )
+            raise InputError(Problem(self.place.name, "", text))
 
     # Parts
 
-    def done(self, plan: Plan) -> set[int]:
-        """Numbers of the chunks whose part is there, whole, and of the right size."""
-        there = set(self.place.names())
-        return {k for k in range(plan.chunks) if _PART.format(k) in there and self._is_whole(plan, k)}
+    def done(self, plan: Plan, tell: Tell = lambda line: None, checked: Tick = lambda done, of: None) -> set[int]:
+        """Numbers of the chunks that are stored: part and kept trajectories are there and whole.
 
-    def _is_whole(self, plan: Plan, number: int) -> bool:
+        Each file is read once. One that is whole but not written as this version would is written anew.
+
+        tell     called with a line about each part that is there and not whole
+        checked  called with the number of parts that were checked, and how many there are
+        Raises InputError if a folder is in the way of a part.
+        """
+        blocked = [name for name in self.place.folders() if _PART_NAME.fullmatch(name)]
+        blocked += [f"{TRAJECTORIES}/{name}" for name in self.place.folders(TRAJECTORIES)]
+        if blocked:
+            text = "is a folder where a file of the dataset belongs: move it away"
+            raise InputError(Problem(f"{self.place.name}/{blocked[0]}", "", text))
+        there = set(self.place.names())
+        trajectories = set(self.place.names(TRAJECTORIES)) if plan.sweep.keep else set()
+        numbers = [number for number in range(plan.chunks) if _PART.format(number) in there]
+        whole = set()
+        for count, number in enumerate(numbers):
+            checked(count, len(numbers))
+            flaw = self._flaw(plan, number, trajectories)
+            if flaw:
+                tell(f"{flaw}: its runs are simulated again")
+            else:
+                whole.add(number)
+        return whole
+
+    def _flaw(self, plan: Plan, number: int, trajectories: Container[str]) -> str:
+        """What is wrong with a chunk's files, "" if nothing is."""
+        chunk = plan.chunk(number)
+        name = _PART.format(number)
+        part = self.read_sealed(plan, chunk)
+        flaw = part.flaw
+        if not flaw and part.better:
+            self.place.write(name, part.better)
+        for index in plan.kept(chunk) if not flaw else ():
+            run = chunk.first + index
+            name = f"{TRAJECTORIES}/{_TRAJECTORY.format(run)}"
+            if _TRAJECTORY.format(run) not in trajectories:
+                return f"{name} is missing"
+            opened = self._opened(name, Seal(self.identity, (run, run)), trajectory_schema(chunk.group.work.system))
+            if opened.flaw:
+                flaw = opened.flaw
+                break
+            if opened.better:
+                self.place.write(name, opened.better)
+        return f"{name} {flaw}" if flaw else ""
+
+    def read_sealed(self, plan: Plan, chunk: Chunk) -> Opened:
+        """The part of a chunk, with what is wrong with it. Raises FileNotFoundError if it is not there."""
+        name, last = _PART.format(chunk.number), chunk.first + chunk.runs - 1
+        opened = self._opened(name, Seal(self.identity, (chunk.first, last)), plan.schema, chunk.runs)
+        if opened.table is not None and not np.array_equal(opened.table["run"], np.arange(chunk.first, last + 1)):
+            return Opened(None, "holds other runs")
+        return opened
+
+    def _opened(self, name: str, seal: Seal, schema: pa.Schema, rows: int | None = None) -> Opened:
         try:
-            with self.place.open(_PART.format(number)) as file:
-                metadata = parquet.read_metadata(file)
-        except (pa.ArrowInvalid, OSError):
-            return False  # it is written anew
-        return bool(metadata.num_rows == plan.chunk(number).runs)
+            with self.place.open(name) as file:
+                return seal.open(file, schema, rows)
+        except FileNotFoundError:
+            raise
+        except OSError as error:
+            return Opened(None, f"cannot be read ({error.strerror or error})")
 
     def write_part(self, chunk: Chunk, table: pa.Table, trajectories: Mapping[int, pa.Table]) -> None:
         """Store the runs of a chunk, and kept trajectories by run. Raises OSError if the place refuses."""
         for run, trajectory in trajectories.items():
-            self.place.write(f"{TRAJECTORIES}/run-{run:09d}.parquet", parquet_bytes(trajectory))
-        self.place.write(_PART.format(chunk.number), parquet_bytes(table))
+            seal = Seal(self.identity, (run, run))
+            self.place.write(f"{TRAJECTORIES}/{_TRAJECTORY.format(run)}", seal.close(trajectory))
+        seal = Seal(self.identity, (chunk.first, chunk.first + chunk.runs - 1))
+        self.place.write(_PART.format(chunk.number), seal.close(table))
 
     def part_name(self, number: int) -> str:
         """File name of a chunk's part."""
@@ -328,24 +493,47 @@ class Dataset:
 
     def parts(self) -> list[str]:
         """Names of the parts, in the order of the runs."""
-        return [name for name in self.place.names() if name.startswith("part-") and name.endswith(".parquet")]
+        return [name for name in self.place.names() if _PART_NAME.fullmatch(name)]
 
     def read_part(self, name: str, columns: Sequence[str] | None = None) -> pa.Table:
-        """The table of one part, or some columns of it."""
-        with self.place.open(name) as file:
-            # One thread: a column of a part is too little for more, and each would keep memory of its own.
-            return parquet.read_table(file, columns=columns, use_threads=False)
+        """The table of one part, or some columns of it; its seal is not looked at.
+
+        Raises InputError if it is no table with these columns.
+        """
+        where = f"{self.place.name}/{name}"
+        try:
+            with self.place.open(name) as file:
+                there = parquet.read_schema(file)
+                missing = [column for column in columns or () if column not in there.names]
+                if missing:
+                    raise InputError(*(unknown(where, "", "column", column, there.names) for column in missing))
+                file.seek(0)
+                # One thread: a column of a part is too little for more, and each would keep memory of its own.
+                table = parquet.read_table(file, columns=columns, use_threads=False)
+        except InputError:
+            raise
+        except (pa.ArrowException, ValueError) as error:
+            text = f"is damaged ({str(error).splitlines()[0]}): springline batch --resume makes it again"
+            raise InputError(Problem(where, "", text)) from error
+        return table.replace_schema_metadata(None)
 
 
 def read_dataset(destination: str | Path, columns: Sequence[str] | None = None) -> pa.Table:
     """All runs of a dataset, or some columns of them, as one table with units, in the order of the runs.
 
     destination  the folder or URL that `springline batch` wrote
-    Raises InputError if it holds no dataset.
+    Raises InputError if it holds no dataset, no runs yet, a part that is none of its own, and for unknown columns.
     """
     dataset = Dataset(place(destination))
     dataset.description()
-    return pa.concat_tables(dataset.read_part(name, columns) for name in dataset.parts())
+    tables = [dataset.read_part(name, columns) for name in dataset.parts()]
+    if not tables:
+        raise InputError(Problem(dataset.place.name, "", "holds no runs yet: springline batch --resume does them"))
+    for name, table in zip(dataset.parts(), tables, strict=True):
+        if table.schema != tables[0].schema:
+            text = "has other columns than the first part: springline batch --resume makes what is not whole again"
+            raise InputError(Problem(f"{dataset.place.name}/{name}", "", text))
+    return pa.concat_tables(tables)
 
 
 def _as_written(description: Mapping[str, Any]) -> dict[str, Any]:
@@ -354,8 +542,8 @@ def _as_written(description: Mapping[str, Any]) -> dict[str, Any]:
     Raises KeyError, TypeError, AttributeError or ValueError if that cannot be told.
     """
     sweep = dict(description["sweep"])
-    vary = [{"key": axis["key"], **tomllib.loads(f"axis = {axis['axis']}")["axis"]} for axis in sweep.pop("vary")]
-    scenario = tomllib.loads(description["scenario"])
+    vary = [{"key": axis["key"], **read_toml(f"axis = {axis['axis']}")["axis"]} for axis in sweep.pop("vary")]
+    scenario = read_toml(description["scenario"])
     rest = {key: value for key, value in description.items() if key not in ("sweep", "scenario", *_FREE)}
     return {**sweep, "vary": vary, **scenario, **rest}
 
@@ -373,7 +561,7 @@ def changes(old: Any, new: Any, where: str = "") -> Iterator[str]:
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new) and any(map(_is_table, old)):
         for i, (a, b) in enumerate(zip(old, new, strict=True)):
             yield from changes(a, b, f"{where}.{i}")
-    elif old != new:
+    elif old != new or type(old) is not type(new):  # true is no 1
         yield f"{where}: {_shown(old)} -> {_shown(new)}"
 
 

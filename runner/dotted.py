@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from springline.codegen.doubles import doubles
 from springline.runner.errors import shortened
+
+_LONGEST_PATH = 16  # no document has keys of ten parts, and each part is a call
 
 
 def expect_keys(given: object, example: str) -> None:
@@ -37,6 +40,8 @@ def replaced(node: Any, path: Sequence[str], value: object, joints: int) -> Any:
     """A copy of `node` with `value` at `path`. LookupError if a list on the way has no such place."""
     if not path:
         return value
+    if len(path) > _LONGEST_PATH:
+        raise LookupError(f"expected a key of at most {_LONGEST_PATH} parts, not {len(path)}")
     head, rest = path[0], path[1:]
     if head.isdecimal() and isinstance(node, int | float) and not isinstance(node, bool):
         node = [node] * joints  # a number for all joints, of which one is to differ
@@ -50,14 +55,24 @@ def replaced(node: Any, path: Sequence[str], value: object, joints: int) -> Any:
     return table | {head: replaced(table.get(head), rest, value, joints)}
 
 
-def plain(value: object) -> object:
-    """Python and NumPy values as TOML would give them."""
+def plain(value: object, deep: int = _LONGEST_PATH) -> object:
+    """Python, NumPy, Arrow and pandas values as TOML would give them, nested no deeper than `deep`.
+
+    Raises TypeError or ValueError for what has no equal there.
+    """
     if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
+        if value.dtype.kind in "mM":  # which NumPy gives as whole numbers of nanoseconds
+            raise TypeError(f"{value.dtype} is no kind of number")
+        value = (doubles(value) if value.dtype.kind == "f" else value).tolist()
+    else:
+        converts = (getattr(value, name, None) for name in ("to_pylist", "as_py", "tolist"))
+        value = next((convert() for convert in converts if convert), value)
     if isinstance(value, Path):
         return str(value)
+    if not isinstance(value, Mapping | list | tuple):
+        return value
+    if deep == 0:
+        raise ValueError(f"it is nested more than {_LONGEST_PATH} deep")
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return value
+        return {str(key): plain(item, deep - 1) for key, item in value.items()}
+    return [plain(item, deep - 1) for item in value]

@@ -1,16 +1,20 @@
-"""Where scenarios and their CSV files are: in the user's folders, or packaged with springline."""
+"""Where scenarios, sweeps and CSV files are, in the user's folders or packaged with springline, and which is which."""
 
 from __future__ import annotations
 
 import errno
 import os
+import shlex
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Literal
 
+from springline.runner import schema
 from springline.runner.errors import InputError, Problem, unknown
+from springline.runner.toml_text import read_toml
 
 PACKAGED = "springline:"
 """A path that begins so is that of a file beside the packaged scenarios: "springline:data/vessel_orcaflex_10hz.csv"."""
@@ -18,6 +22,19 @@ PACKAGED = "springline:"
 # What is larger would fill the memory before anything could be said of it.
 _LARGEST_SCENARIO = 2**24
 _LARGEST_SIGNAL_FILE = 2**30
+
+
+Kind = Literal["scenario", "sweep", "dataset", "folder of a run", ""]
+"""What a user may give to a command; "" for what is of no kind that can be told."""
+
+_SWEEPS_OWN = ("scenario", "vary", "method", "samples", "keep")
+
+
+def kind_of(document: Mapping[str, object]) -> Kind:
+    """What a TOML document is, by the keys at its top: a sweep varies a scenario that it names."""
+    if any(key in document for key in _SWEEPS_OWN):
+        return "sweep"
+    return "scenario" if any(key in document for key in schema.TABLES) else ""
 
 
 def packaged_scenarios() -> tuple[str, ...]:
@@ -43,6 +60,50 @@ def _packaged(folder: Traversable, suffix: str, prefix: str = "") -> Iterator[st
             yield prefix + (item.name.removesuffix(suffix) if suffix == ".toml" else item.name)
 
 
+def packaged_sweeps() -> tuple[str, ...]:
+    """Names of the sweeps that come with springline, sorted."""
+    return tuple(sorted(_packaged(scenarios_folder() / "sweeps", ".toml")))
+
+
+def expect_kind(wanted: Kind, source: str | Path, document: Mapping[str, object] | None = None) -> None:
+    """Raise InputError, with the command that takes it, for an input of another kind than a command wants.
+
+    source    what the user gave: a packaged name, a file, or a folder
+    document  what is in it, where it has been read
+    What is of no kind that can be told passes, for whoever reads it to say what is wrong with it.
+    """
+    name = str(source)
+    found = kind_of(document) if document is not None else _packaged_kind(name) or _kind_at(Path(name))
+    if not found or found == wanted:
+        return
+    quoted = shlex.quote(name)
+    commands = {
+        "scenario": f"springline run {quoted}",
+        "sweep": f"springline batch {quoted}",
+        "dataset": f"springline replay {quoted} RUN, or springline batch SWEEP -o {quoted} --resume",
+        "folder of a run": f"its scenario is {Path(name, 'scenario.toml')}",
+    }
+    raise InputError(Problem(name, "", f"this is a {found}: {commands[found]}"))
+
+
+def _packaged_kind(name: str) -> Kind:
+    if name in packaged_scenarios():
+        return "scenario"
+    return "sweep" if name in packaged_sweeps() else ""
+
+
+def _kind_at(path: Path) -> Kind:
+    """What a folder is by the files that our commands leave in it, and a file by its text."""
+    try:
+        if not path.is_dir():
+            return kind_of(read_toml(_contents(path, _LARGEST_SCENARIO).decode("utf-8-sig")))
+        if (path / "sweep.json").exists():
+            return "dataset"
+        return "folder of a run" if (path / "scenario.toml").exists() else ""
+    except (OSError, ValueError):
+        return ""
+
+
 def read_scenario(source: str | Path) -> tuple[str, Path]:
     """Text of a scenario (a file, or a packaged one by name), and the folder that its relative paths refer to.
 
@@ -59,8 +120,10 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         if path.suffix == ".toml" and path.parent.is_dir():
             there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
             raise InputError(Problem(name, "", "there is no such file", "", path.name, there)) from error
+        expect_kind("scenario", source)
         raise InputError(unknown(name, "", "file or packaged scenario", name, packaged_scenarios())) from error
     except IsADirectoryError as error:
+        expect_kind("scenario", source)
         text = "is a folder: expected a TOML file or the name of a packaged scenario"
         raise InputError(Problem(name, "", text)) from error
     except (OSError, ValueError) as error:  # no UTF-8, and names that no file can have

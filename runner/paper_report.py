@@ -14,6 +14,7 @@ from springline.runner.paper_figures import FIGURES, OPEN_FIGURES, PaperFigure
 from springline.runner.paper_runs import LAYERS, LIMITS, LITERAL, READINGS, Experiment, Study, Twice
 from springline.runner.report import Block, Bullets, Document, Heading, Picture, Table, Text
 from springline.runner.scenario import Scenario
+from springline.runner.toml_text import value_text
 
 TIMES = ("response_time", "settling_time")
 ERRORS = ("overshoot", "steady_state_error")
@@ -121,6 +122,12 @@ def _summary(study: Study, findings: Sequence[Finding], step: float) -> list[Blo
         {f"Halving the step changes a check of claim {moved}." if moved else "Halving the step changes no verdict."}
         What the paper does not publish was chosen here and is listed at the end."""),
     ]
+    if study.changes:
+        changed = ", ".join(f"`{key} = {value_text(value)}`" for key, value in study.changes.items())
+        blocks.append(
+            _prose(f"""**This is not the paper's system**: in all runs {changed} takes the place of what is said below,
+            but where an experiment varies the same.""")
+        )
     if findings:
         rows = [(str(f.number), f.claim, f"[[{f.verdict}]]") for f in findings]
         blocks.append(Table(("claim", "", "verdict"), rows, labels=3))

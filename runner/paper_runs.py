@@ -19,6 +19,7 @@ from springline.model import theory
 from springline.model.sliding import SurfaceExponents
 from springline.model.system import Structure, System
 from springline.runner.claims import Evidence, Theory
+from springline.runner.errors import InputError, Problem
 from springline.runner.measured import Floats, Measured
 from springline.runner.paper_cases import LAWS, cases
 from springline.runner.scenario import Scenario, load_scenario
@@ -90,6 +91,7 @@ class Study:
     """All runs of a reproduction.
 
     groups     groups of Table 2 that were run
+    changes    overrides of all scenarios, by dotted key
     whole      whether the rest was run too: Figures 4 to 7 and the sections on what the paper leaves open
     scenarios  scenario name -> scenario of each case
     evidence, halved  what the claims look at, with the scenarios' step and with half of it
@@ -97,6 +99,7 @@ class Study:
     """
 
     groups: tuple[int, ...]
+    changes: Overrides
     whole: bool
     scenarios: Mapping[str, Scenario]
     evidence: Evidence
@@ -107,12 +110,17 @@ class Study:
     limits: Mapping[str, Twice]
 
 
-def study(groups: Sequence[int], *, whole: bool, progress: Progress | None = None) -> Study:
+def study(
+    groups: Sequence[int], *, whole: bool, changes: Overrides | None = None, progress: Progress | None = None
+) -> Study:
     """Run everything that a reproduction of these groups needs.
 
+    changes   overrides of all scenarios; where an experiment varies the same key, the experiment's counts
     progress  called now and then with the share that is done (0 .. 1)
-    Raises ValueError for a group that the paper does not have, ToolchainError if there is no C compiler.
+    Raises InputError for overrides that a scenario refuses or that the report has no analysis for, ValueError for a
+    group that the paper does not have, ToolchainError if there is no C compiler.
     """
+    changed = dict(changes or {})
     names = [case.scenario for case in cases(groups)]
     tables = (LITERAL, READINGS, LAYERS, LIMITS) if whole else ()
     wanted: dict[Key, tuple[str, Overrides]] = {("case", name): (name, {}) for name in names}
@@ -122,12 +130,16 @@ def study(groups: Sequence[int], *, whole: bool, progress: Progress | None = Non
         for key, experiment in table.items()
     }
     scenarios = {
-        (*key, half): _scenario(name, overrides, half)
+        (*key, half): _scenario(name, {**changed, **overrides}, half)
         for key, (name, overrides) in wanted.items()
         for half in (False, True)
     }
     linear = (
-        {(law, half): _scenario("paper/nominal", {"control.law": law}, half) for law in LAWS for half in (False, True)}
+        {
+            (law, half): _scenario("paper/nominal", {**changed, "control.law": law}, half)
+            for law in LAWS
+            for half in (False, True)
+        }
         if whole
         else {}
     )
@@ -142,7 +154,7 @@ def study(groups: Sequence[int], *, whole: bool, progress: Progress | None = Non
                 for name, run in measured.items()
                 if run.status == "ok"
             },
-            laws={law: reaching_law(load_scenario("paper/nominal", {"control.law": law})) for law in LAWS}
+            laws={law: reaching_law(load_scenario("paper/nominal", {**changed, "control.law": law})) for law in LAWS}
             if whole
             else {},
             linear={law: runs["linear", law, half] for law in LAWS} if whole else {},
@@ -153,6 +165,7 @@ def study(groups: Sequence[int], *, whole: bool, progress: Progress | None = Non
 
     return Study(
         tuple(sorted(set(groups))),
+        changed,
         whole,
         {name: scenarios["case", name, False] for name in names},
         evidence(False),
@@ -163,6 +176,9 @@ def study(groups: Sequence[int], *, whole: bool, progress: Progress | None = Non
 
 def _scenario(name: str, overrides: Overrides, half: bool) -> Scenario:
     plain = load_scenario(name, dict(overrides))
+    if plain.signal_tables:
+        text = "the report's bounds need signals that are formulas: expected another kind than a table"
+        raise InputError(Problem(f"override of {name}", "", text))
     step = plain.step / 2 if half else plain.step
     return load_scenario(
         name, {**overrides, "simulation.step": step, "simulation.output_every": max(1, round(ROW_INTERVAL / step))}

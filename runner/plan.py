@@ -18,9 +18,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from springline.codegen.doubles import double
 from springline.model.parameters import Bounds
 from springline.runner import sampling
 from springline.runner.errors import InputError, Problem, unknown
+from springline.runner.records import FOLDER as TABLES
+from springline.runner.records import Record, portable_text, records
 from springline.runner.scenario import NumericKey, Scenario
 from springline.runner.schema import given_text, number_text
 from springline.runner.simulate import field, metrics_schema, metrics_table, trajectory_schema
@@ -32,6 +35,11 @@ Floats = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 
 MOST_GROUPS = 256
+MOST_PARTS = 1_000_000
+"""As many as the six digits of their names tell apart; a folder of more is slow everywhere."""
+
+FORMAT = 2
+"""Of datasets: what their description says and how their parts are sealed. 1 said nothing of a format."""
 
 # A chunk is what a kill loses and what a thread takes at a time. Of a large sweep it is some seconds of work, but no
 # more runs than keep memory flat; of a small one it is enough to make the milliseconds of drawing and storing it not
@@ -45,6 +53,7 @@ _FEWEST_CHUNKS = 8
 _TRAJECTORY_BYTES = 64e6
 _DEVIATIONS = 8.3  # the farthest that sampling.normal reaches
 _SCAN = 65536
+_MOST_STEPS_IN_ALL = 2**63 - 1  # the counter of the loop's progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +83,14 @@ class Chunk:
     runs: int
 
 
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A CSV file that a dataset keeps, and the values of a key such as "base_motion.path" that mean it."""
+
+    record: Record
+    paths: tuple[str, ...]
+
+
 class Plan:
     """All runs of a sweep.
 
@@ -89,11 +106,13 @@ class Plan:
         self._outer = [axis for axis in self._free if self._groups_runs(axis)]
         self._inner = [axis for axis in self._free if axis not in self._outer]
         self._sobol: sampling.Sobol | None = None
+        self._read: dict[int, list[Record]] = {}
         self._check_axes()
         self.groups = self._make_groups()
         self.chunk_size = chunk or sweep.chunk or self._fitting_chunk()
         counts = [-(-group.runs // self.chunk_size) for group in self.groups]
         self._first_chunks = [0, *itertools.accumulate(counts)]
+        self._refuse_endless()
 
     # Chunks
 
@@ -124,7 +143,19 @@ class Plan:
             system, rows = self.groups[0].work.system, max(group.work.settings.rows for group in self.groups)
             kept = 8 * rows * len(trajectory_schema(system)) / self.sweep.keep
             size = min(size, _TRAJECTORY_BYTES / kept)
+        size = max(size, self.runs / (MOST_PARTS - len(self.groups)))
         return max(1, math.ceil(size / _PACKS)) * _PACKS
+
+    def _refuse_endless(self) -> None:
+        """Raise InputError for what no folder or counter has numbers for."""
+        source, steps = self.sweep.source, sum(group.runs * group.work.settings.steps for group in self.groups)
+        if self.chunks > MOST_PARTS:
+            fewest = math.ceil(self.runs / (MOST_PARTS - len(self.groups)))
+            text = f"expected at least {fewest}: {self.chunks:,} parts are more than {MOST_PARTS:,}"
+            raise InputError(Problem(source, "chunk", text, str(self.chunk_size)))
+        if steps > _MOST_STEPS_IN_ALL:
+            text = f"expected fewer or shorter runs: {steps:,} steps are more than {_MOST_STEPS_IN_ALL:,}"
+            raise InputError(Problem(source, "samples", text))
 
     def kept(self, chunk: Chunk) -> list[int]:
         """The runs of a chunk whose trajectory is stored, as indices into the chunk."""
@@ -200,16 +231,21 @@ class Plan:
 
     def as_json(self) -> dict[str, Any]:
         """All that decides the dataset, as plain data: two plans with the same description give the same tables."""
+        names = {kept.record: name for name, kept in self.tables.items()}
+        paths = {r.section: f"{TABLES}/{names[r]}" for r in self._records(self.sweep.scenario)}
         return {
+            "format": FORMAT,
+            "sampler": sampling.VERSION,
             "sweep": self.sweep.as_json(),
-            "scenario": self.sweep.scenario.to_toml(),
-            "tables": tables_hash(self.sweep.scenario),
+            "scenario": portable_text(self.sweep.scenario, paths),
+            "tables": {name: {"sha256": k.record.sha256, "paths": list(k.paths)} for name, k in self.tables.items()},
             "groups": [
                 {
                     "constants": group.constants,
                     "first": group.first,
                     "runs": group.runs,
                     "kernel": group.work.identity,
+                    "splines": _splines_hash(group.scenario),
                 }
                 for group in self.groups
             ],
@@ -217,6 +253,24 @@ class Plan:
             "chunk": self.chunk_size,
             "chunks": self.chunks,
         }
+
+    @cached_property
+    def tables(self) -> dict[str, Kept]:
+        """The CSV files that the runs read, by the name that each gets in the dataset."""
+        found: dict[Record, tuple[str, list[str]]] = {}
+        for scenario, constants in ((self.sweep.scenario, {}), *((g.scenario, g.constants) for g in self.groups)):
+            for record in self._records(scenario):
+                earlier = sum(other.section == record.section for other in found)
+                name = f"{record.section}{f'-{earlier + 1}' if earlier else ''}.csv"
+                _, paths = found.setdefault(record, (name, []))
+                paths += [str(constants[key]) for key in (f"{record.section}.path",) if key in constants]
+        return {name: Kept(record, tuple(dict.fromkeys(paths))) for record, (name, paths) in found.items()}
+
+    def _records(self, scenario: Scenario) -> list[Record]:
+        """The files of a scenario; groups share scenarios, and each is read once."""
+        if id(scenario) not in self._read:
+            self._read[id(scenario)] = records(scenario)
+        return self._read[id(scenario)]
 
     # Making groups
 
@@ -252,7 +306,7 @@ class Plan:
                 chosen = {axis.key: i for axis, i in zip([*crossed, *shared], [*fixed, *share], strict=True)}
                 constants = self._constants(chosen)
                 structural = {key: value for key, value in constants.items() if key not in self._numeric}
-                name = repr(structural)
+                name = given_text(structural)
                 if name not in works:
                     scenario = self._structured(structural)
                     works[name] = scenario, self._work(scenario)
@@ -269,7 +323,7 @@ class Plan:
             elif axis.tie in chosen:
                 place = chosen[axis.tie]
                 other = next(item for item in self._outer if item.key == axis.tie)
-                constants[axis.key] = axis.values[place] if axis.values else axis.factor * other.values[place]
+                constants[axis.key] = _tied_value(axis, other.values[place], place)
         return {key: float(value) if key in self._numeric else value for key, value in constants.items()}
 
     def _structured(self, structural: Mapping[str, Any]) -> Scenario:
@@ -306,11 +360,9 @@ class Plan:
         """The numeric keys of a run whose free axes stand at the given values."""
         probe = {}
         for axis in self.sweep.axes:
-            value, place = at[axis.tie or axis.key]
-            if axis.kind == "tie":
-                value = axis.values[place] if axis.values else axis.factor * value
             if axis.key in self._numeric:
-                probe[axis.key] = float(value)
+                value, place = at[axis.tie or axis.key]
+                probe[axis.key] = float(_tied_value(axis, value, place) if axis.kind == "tie" else value)
         return probe
 
     # Drawing
@@ -368,9 +420,10 @@ class Plan:
         label = f"vary.{axis.key}"
         expected = f"expected {number_text(key.bounds, key.unit)}"
         values = axis.values or (source.values if axis.kind == "tie" else ())
-        if any(isinstance(value, bool) or not isinstance(value, int | float) for value in values):
-            return [Problem(self.sweep.source, label, expected, given_text(list(values)))]
-        reach = values or source.span
+        try:
+            reach = tuple(map(double, values)) or source.span
+        except (TypeError, ValueError) as error:
+            return [Problem(self.sweep.source, label, f"{expected} ({error})", given_text(list(values)))]
         if source.kind == "normal" and not values:
             mean, deviation = source.span
             reach = (mean - _DEVIATIONS * deviation, mean + _DEVIATIONS * deviation)
@@ -410,6 +463,13 @@ class Plan:
         return []
 
 
+def _tied_value(axis: Axis, value: Any, place: int) -> Any:
+    """What a tied key is where the other stands at `value`, which need be no number, in its place of its values."""
+    if axis.values:
+        return axis.values[place]
+    return value if axis.factor == 1.0 else axis.factor * value
+
+
 def _grid_values(axis: Axis) -> Floats:
     if axis.values:
         return np.array(axis.values, dtype=np.float64)
@@ -430,8 +490,8 @@ def _cell(value: Any, kind: pa.DataType) -> Any:
     return value if isinstance(value, str) else value_text(value)
 
 
-def tables_hash(scenario: Scenario) -> str:
-    """Hash of the signal tables, whose numbers stand in files of their own; "" if there are none."""
+def _splines_hash(scenario: Scenario) -> str:
+    """Hash of what the kernel reads of the signal tables; "" if there are none."""
     if not scenario.signal_tables:
         return ""
     digest = sha256()

@@ -15,6 +15,9 @@ from hashlib import sha256
 import numpy as np
 from numpy.typing import NDArray
 
+VERSION = 1
+"""Goes up whenever any number that is drawn here changes: a dataset that was begun with another is not continued."""
+
 Floats = NDArray[np.float64]
 Indices = NDArray[np.uint64]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from springline.codegen.doubles import doubles
 from springline.model.base import COORDINATES
 from springline.model.drive import DRIVES, DriveKind
 from springline.model.mechanisms import MECHANISMS
@@ -24,13 +26,15 @@ from springline.runner import schema
 from springline.runner.checking import Document, resolve
 from springline.runner.dotted import expect_keys, flat, plain, replaced, scale_key
 from springline.runner.errors import InputError, Problem, shortened, unknown
-from springline.runner.locate import packaged_scenarios, read_scenario, relative_path
+from springline.runner.locate import expect_kind, packaged_scenarios, read_scenario, relative_path
 from springline.runner.tables import Table
-from springline.runner.toml_text import document_text
+from springline.runner.toml_text import document_text, read_toml
 
 __all__ = ["NumericKey", "Scenario", "expect_scenario", "load_scenario", "packaged_scenarios", "parse_set"]
 
 Floats = NDArray[np.float64]
+_BARE_WORD = re.compile(r"([^\W\d]|\.{0,2}/)[\w.:/+-]*")
+
 Slots = dict[str, float | Floats]
 """Slot key -> one number for all runs, or a column (runs,) of them."""
 
@@ -183,36 +187,54 @@ class Scenario:
         slots = self.slots_for(columns)
         return per_run(slots, list(slots), max(np.size(values) for values in slots.values()))
 
-    def slots_for(self, columns: Mapping[str, ArrayLike]) -> Slots:
-        """What each slot is, in the order of System.slots: `columns` holds one number a run for each numeric key.
+    def columns_for(self, columns: Mapping[str, ArrayLike]) -> dict[str, Floats]:
+        """Columns of numbers, one a run, by numeric key: each as a native float64 array of one dimension.
 
-        Where two keys set the same entry, the later one counts.
-        Raises InputError for an unknown key, a value out of bounds, and columns of different lengths.
+        Raises InputError for an unknown key, what is no column of numbers, a number that would not stay what it is, and
+        one that is out of bounds.
         """
         keys, problems = _numeric_keys(self.structure()), []
-        numbers: dict[str, float | Floats] = dict(self._numbers)
-        runs = 1
+        result = {}
         for name, values in columns.items():
             if name not in keys:
                 problems.append(unknown(self.source, name, "numeric key", name, keys))
                 continue
-            column = np.asarray(values)
-            if column.ndim != 1 or column.dtype.kind not in "iuf" or (runs not in (1, len(column))):
-                text = "expected a column of numbers, one for each run, as long as the others"
-                problems.append(Problem(self.source, name, text, f"shape {column.shape} of {column.dtype}"))
+            try:
+                column = np.atleast_1d(doubles(values))
+            except (TypeError, ValueError) as error:
+                problems.append(Problem(self.source, name, f"expected a column of numbers ({error})"))
                 continue
-            column = column.astype(np.float64)
-            runs = len(column)
+            if column.ndim != 1:
+                text = "expected a column of numbers, one for each run"
+                problems.append(Problem(self.source, name, text, f"shape {column.shape}"))
+                continue
             outside = _first_outside(keys[name].bounds, column)
             if outside is not None:
                 text = f"run {outside}: expected {schema.number_text(keys[name].bounds, keys[name].unit)}"
                 problems.append(Problem(self.source, name, text, schema.given_text(float(column[outside]))))
+            result[name] = column
+        if problems:
+            raise InputError(*problems)
+        return result
+
+    def slots_for(self, columns: Mapping[str, ArrayLike]) -> Slots:
+        """What each slot is, in the order of System.slots: `columns` as for `columns_for`, all of one length.
+
+        Where two keys set the same entry, the later one counts. Raises InputError.
+        """
+        keys = _numeric_keys(self.structure())
+        numbers: dict[str, float | Floats] = dict(self._numbers)
+        checked = self.columns_for(columns)
+        runs = len(next(iter(checked.values()), ()))
+        text = "expected a column of numbers, one for each run, as long as the others"
+        other = [(name, len(column)) for name, column in checked.items() if len(column) != runs]
+        if other:
+            raise InputError(*(Problem(self.source, name, text, f"{count} numbers") for name, count in other))
+        for name, column in checked.items():
             for leaf in keys[name].leaves:
                 if leaf.startswith("plant."):  # a value and a factor exclude each other
                     numbers.pop(leaf.replace(".scale", "") if ".scale" in leaf else scale_key(leaf), None)
                 numbers[leaf] = column
-        if problems:
-            raise InputError(*problems)
         return {slot.key: self._slot(slot.key, numbers) for slot in self.system().slots}
 
     @cached_property
@@ -254,6 +276,8 @@ class Scenario:
                 document = replaced(document, key.split("."), plain(value), joints)
             except LookupError as error:
                 problems.append(Problem(where, key, f"there is no such entry: {error.args[0]}"))
+            except (TypeError, ValueError) as error:
+                problems.append(Problem(where, key, f"expected a value that TOML can hold: {error}"))
         if problems:
             raise InputError(*problems)
         return Scenario(self.source, self.folder, *resolve(document, where, self.folder))
@@ -306,9 +330,10 @@ def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = N
     name = str(source)
     text, folder = read_scenario(source)
     try:
-        document = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+        document = read_toml(text)
+    except ValueError as error:
         raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
+    expect_kind("scenario", source, document)
     scenario = Scenario(name, Path(), *resolve(document, name, folder))
     return scenario if overrides is None else scenario.with_overrides(overrides)
 
@@ -327,8 +352,9 @@ def expect_scenario(given: object) -> None:
 
 
 def parse_set(text: str, source: str) -> tuple[str, object]:
-    """KEY=TOMLVALUE as a key and a value: "control.delta=0.02", 'control.law="power"', "plant.m3={ scale = 1.2 }".
+    """KEY=TOMLVALUE as a key and a value: "control.delta=0.02", "control.law=power", "plant.m3={ scale = 1.2 }".
 
+    What is no TOML value but a bare word, or a path, is text: quotes inside a shell's quotes are a nuisance.
     source  the scenario that it is to override, for messages
     Raises InputError if it is not of that form.
     """
@@ -338,9 +364,11 @@ def parse_set(text: str, source: str) -> tuple[str, object]:
     if not equals or not key:
         raise InputError(Problem(where, "", "expected --set KEY=VALUE", schema.given_text(text)))
     try:
-        parsed = tomllib.loads(f"value = {value}")
-    except (ValueError, RecursionError) as error:
-        hint = f"expected a TOML value ({error}); a text needs quotes: --set '{key}=\"…\"'"
+        parsed = read_toml(f"value = {value}")
+    except ValueError as error:
+        if isinstance(error, tomllib.TOMLDecodeError) and _BARE_WORD.fullmatch(value.strip()):
+            return key, value.strip()
+        hint = f"expected a TOML value ({error}); a text of several words needs quotes: --set '{key}=\"…\"'"
         raise InputError(Problem(where, key, hint, value.strip())) from error
     if set(parsed) != {"value"}:
         raise InputError(Problem(where, key, "expected one TOML value", schema.given_text(value)))

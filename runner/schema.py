@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, cast, get_args
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError, create_model
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
+from springline.codegen.doubles import double
 from springline.codegen.kernel import MOST_STEPS
 from springline.model.base import COORDINATES
 from springline.model.drive import DRIVES, EPSILON, DriveKind
@@ -72,12 +73,11 @@ def number(unit: str = "1", bounds: Bounds = REAL) -> Leaf:
     expected = number_text(bounds, unit)
 
     def check(value: object) -> float:
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            try:
-                if bounds.holds(float(value)):
-                    return float(value)
-            except OverflowError:
-                pass  # an integer beyond the doubles
+        try:
+            if bounds.holds(double(value)):
+                return double(value)
+        except (TypeError, ValueError):
+            pass
         raise _wrong(f"expected {expected}")
 
     return Leaf(expected, check)

@@ -14,8 +14,6 @@ import contextlib
 import io
 import json
 import os
-import secrets
-import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Literal
@@ -23,10 +21,9 @@ from typing import Literal
 import pyarrow as pa
 from pyarrow import csv, parquet
 
-Format = Literal["parquet", "csv"]
+from springline.codegen.unfinished import temporary, workplace
 
-TEMPORARY = ".springline-"
-"""How the names of unfinished files and folders begin; whoever reads a folder passes them over."""
+Format = Literal["parquet", "csv"]
 
 
 def units(table: pa.Table) -> dict[str, str]:
@@ -81,12 +78,12 @@ def write_file(path: Path, content: bytes) -> None:
     The folder must exist. A process that is killed on the way leaves what was there before, and perhaps a file
     whose name begins with `TEMPORARY`. Raises OSError if the disk refuses.
     """
-    temporary = _temporary(path.parent)
+    unfinished = temporary(path.parent)
     try:
-        _write_through(temporary, content)
-        os.replace(temporary, path)
+        _write_through(unfinished, content)
+        os.replace(unfinished, path)
     except BaseException:
-        temporary.unlink(missing_ok=True)
+        unfinished.unlink(missing_ok=True)
         raise
     _sync(path.parent)
 
@@ -102,9 +99,9 @@ def write_folder(folder: Path, files: Mapping[str, bytes], replaces: Iterable[st
     folder is not there, and an existing one is as it was.
     """
     fresh = not folder.exists()
-    (folder.parent if fresh else folder).mkdir(parents=True, exist_ok=True)
-    staging = _temporary(folder.parent if fresh else folder)
-    try:
+    within = folder.parent if fresh else folder
+    within.mkdir(parents=True, exist_ok=True)
+    with workplace(within) as staging:
         for name, content in files.items():
             (staging / name).parent.mkdir(parents=True, exist_ok=True)
             _write_through(staging / name, content)
@@ -114,8 +111,6 @@ def write_folder(folder: Path, files: Mapping[str, bytes], replaces: Iterable[st
             for name in files:
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 os.replace(staging / name, folder / name)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
     new = {folder / name for name in files}
     for old in {path for pattern in replaces for path in folder.glob(pattern)} - new:
         old.unlink()
@@ -127,11 +122,6 @@ def write_folder(folder: Path, files: Mapping[str, bytes], replaces: Iterable[st
 
 def _json(value: object) -> bytes:
     return (json.dumps(value, indent=2, ensure_ascii=False) + "\n").encode()
-
-
-def _temporary(folder: Path) -> Path:
-    """A new name in `folder`. Beside the target, for only there is a rename sure to stay in one file system."""
-    return folder / f"{TEMPORARY}{secrets.token_hex(8)}"
 
 
 def _write_through(path: Path, content: bytes) -> None:

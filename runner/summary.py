@@ -6,7 +6,7 @@ Tables of a million rows are read one column, or one part, at a time, so that me
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -67,9 +67,12 @@ class Summary:
         return sum(group[status] for group in self.outcomes.values() for status in _OUTCOMES if status != "ok")
 
 
-def summarize(plan: Plan, dataset: Dataset) -> Summary:
-    """The Summary of the parts that are there. Raises ValueError if there are none."""
-    chunks = [plan.chunk(number) for number in sorted(dataset.done(plan))]
+def summarize(plan: Plan, dataset: Dataset, done: Collection[int] | None = None) -> Summary:
+    """The Summary of the parts that are there and whole. Raises ValueError if there are none.
+
+    done  numbers of their chunks, if they are known
+    """
+    chunks = [plan.chunk(number) for number in sorted(dataset.done(plan) if done is None else done)]
     if not chunks:
         raise ValueError("no runs to summarize")
     runs = sum(chunk.runs for chunk in chunks)

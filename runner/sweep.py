@@ -27,19 +27,19 @@ where the other's stands.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from difflib import get_close_matches
-from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
+from springline.codegen.doubles import double
 from springline.runner.errors import InputError, Problem, unknown
+from springline.runner.locate import expect_kind, packaged_sweeps, scenarios_folder
 from springline.runner.scenario import Scenario, load_scenario
 from springline.runner.schema import given_text
-from springline.runner.toml_text import value_text
+from springline.runner.toml_text import read_toml, value_text
 
 Method = Literal["grid", "random", "sobol", "latin_hypercube"]
 Kind = Literal["uniform", "log_uniform", "normal", "values", "each", "tie"]
@@ -82,21 +82,6 @@ class Axis:
         return {self.kind: list(self.span)} | ({"points": self.points} if self.points else {})
 
 
-def axis_from_json(entry: Mapping[str, Any]) -> Axis:
-    """The Axis of an entry of `Sweep.as_json`. Raises KeyError or TOMLDecodeError (a ValueError) if it is none."""
-    key, content = entry["key"], tomllib.loads(f"axis = {entry['axis']}")["axis"]
-    if "tie" in content:
-        values = tuple(content.get("values", ()))
-        return Axis(key, "tie", values=values, tie=content["tie"], factor=content.get("factor", 1.0))
-    kind = next((kind for kind in _KINDS if kind in content), None)
-    if kind is None:
-        raise KeyError(key)
-    if kind in ("values", "each"):
-        return Axis(key, kind, values=tuple(content[kind]))
-    low, high = content[kind]
-    return Axis(key, kind, (low, high), points=content.get("points", 0))
-
-
 @dataclass(frozen=True)
 class Sweep:
     """A sweep file, checked; which values a key admits is checked by the Plan.
@@ -128,34 +113,65 @@ class Sweep:
         }
 
 
-def load_sweep(source: str | Path) -> Sweep:
+def load_sweep(source: str | Path, overrides: Mapping[str, object] | None = None) -> Sweep:
     """Load a sweep: a TOML file, or a packaged one by name ("stability_map").
 
+    overrides  values of the scenario for all runs, by dotted key, that take the place of the file's
     Raises InputError that names all mistakes of the file: key, what was expected, the nearest valid name.
     """
     name = str(source)
     text, folder = _read(source)
     try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        document = read_toml(text)
+    except ValueError as error:
         raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
-    return _Reader(name, folder).sweep(document)
+    sweep = _Reader(name, folder).sweep(document)
+    return sweep if not overrides else _overridden(sweep, overrides)
 
 
-def packaged_sweeps() -> tuple[str, ...]:
-    """Names of the sweeps that come with springline, sorted."""
-    return tuple(sorted(f.name.removesuffix(".toml") for f in _packaged().iterdir() if f.name.endswith(".toml")))
+def _overridden(sweep: Sweep, overrides: Mapping[str, object]) -> Sweep:
+    """The sweep with another scenario. Raises InputError for a key that has no effect because it varies."""
+    where = f"override of {sweep.source}"
+    problems = [
+        Problem(where, key, f"it varies in this sweep (vary.{axis.key}): an override has no effect")
+        for key in overrides
+        for axis in sweep.axes
+        if _covers(axis.key, key)
+    ]
+    if problems:
+        raise InputError(*problems)
+    return replace(sweep, scenario=sweep.scenario.with_overrides(overrides))
 
 
-def _packaged() -> Traversable:
-    return resources.files("springline.runner") / "scenarios" / "sweeps"
+def _covers(varied: str, key: str) -> bool:
+    """Whether a key that varies decides all that another would set; a value and a factor of the plant are one."""
+    outer, inner = ([part for part in name.split(".") if part != "scale"] for name in (varied, key))
+    return inner[: len(outer)] == outer
+
+
+def sweep_from_json(entry: Mapping[str, Any], chunk: int, scenario: Scenario, source: str) -> Sweep:
+    """The Sweep of an entry that `Sweep.as_json` made: what it holds is checked like a file.
+
+    source  what it came from, for messages
+    Raises InputError, or KeyError, TypeError, AttributeError or ValueError where it has not even the shape.
+    """
+    vary = {item["key"]: read_toml(f"axis = {item['axis']}")["axis"] for item in entry["vary"]}
+    document = {**entry, "vary": vary, "chunk": chunk}
+    if entry["method"] == "grid":
+        del document["samples"]
+    sweep = _Reader(source, Path()).sweep(document, scenario)
+    if sweep.samples != entry["samples"]:
+        raise ValueError(f"samples = {entry['samples']}, but its axes have {sweep.samples} points")
+    return sweep
 
 
 def _read(source: str | Path) -> tuple[str, Path]:
     """Text of a sweep, and the folder that its scenario's path refers to."""
     name = str(source)
     if not isinstance(source, Path) and name in packaged_sweeps():
-        return (_packaged() / f"{name}.toml").read_text("utf-8"), Path(str(_packaged()))
+        folder = scenarios_folder() / "sweeps"
+        return (folder / f"{name}.toml").read_text("utf-8"), Path(str(folder))
+    expect_kind("sweep", source)
     path = Path(source)
     if not path.is_file():
         there = sorted(str(path.parent / item.name) for item in path.parent.glob("*.toml"))
@@ -174,8 +190,8 @@ class _Reader:
         self._folder = folder
         self._problems: list[Problem] = []
 
-    def sweep(self, document: Mapping[str, Any]) -> Sweep:
-        """The Sweep. Raises InputError."""
+    def sweep(self, document: Mapping[str, Any], scenario: Scenario | None = None) -> Sweep:
+        """The Sweep; of `scenario`, or of the one that the document names. Raises InputError."""
         self._problems += [unknown(self._name, key, "key", key, _KEYS) for key in document if key not in _KEYS]
         method = document.get("method", "random")
         if method not in get_args(Method):
@@ -188,7 +204,7 @@ class _Reader:
         chunk = self._whole(document, "chunk", 0, 1, _LARGEST_CHUNK)
         keep = self._keep(document.get("keep", {}))
         axes = self._axes(document.get("vary", {}), method)
-        scenario = self._scenario(document)
+        scenario = scenario or self._scenario(document)
         samples = self._samples(document, cast(Method, method), axes)
         if self._problems or scenario is None:
             raise InputError(*self._problems)
@@ -250,7 +266,7 @@ class _Reader:
                     self._name,
                     "vary" if method == "grid" else "samples",
                     f"expected at most {MOST_RUNS:,} runs (a random sample of a grid tells as much)",
-                    f"{samples * each:.3g} runs",
+                    f"{_count_text(samples * each)} runs",
                 )
             )
         return samples
@@ -379,7 +395,15 @@ def _is_whole(value: object) -> bool:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    try:
+        return math.isfinite(double(value))
+    except (TypeError, ValueError):
+        return False
+
+
+def _count_text(count: int) -> str:
+    """A whole number of any length for people, three digits of it: "1e+12", "1.00e+400"."""
+    return f"{count:.3g}" if count < 10**300 else f"{Decimal(count):.3g}"
 
 
 def _entries(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:

@@ -1,12 +1,43 @@
-"""Plain data as TOML text: what `tomllib` reads, the standard library does not write."""
+"""TOML text as plain data and back: `tomllib` with a bound on depth, and the writer that the standard library lacks."""
 
 from __future__ import annotations
 
 import json
 import re
+import tomllib
 from collections.abc import Mapping
+from typing import Any
 
+_DEEPEST = 32  # tables and lists in each other: no file of ours needs ten, and whatever walks a document recurses
+
+_MOST_BITS = 2048
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def read_toml(text: str) -> dict[str, Any]:
+    """The document of a TOML text, shallow enough to be walked recursively.
+
+    Raises ValueError for what is no TOML, or nested more deeply than anything here.
+    """
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError as error:  # the one that Python has for integers
+        raise ValueError("an integer has thousands of digits") from error
+    except RecursionError as error:
+        raise ValueError(_too_deep()) from error
+    layer: list[Any] = [document]
+    for _ in range(_DEEPEST):
+        layer = [item for node in layer for item in (node.values() if isinstance(node, dict) else node)]
+        layer = [item for item in layer if isinstance(item, dict | list)]
+    if layer:
+        raise ValueError(_too_deep())
+    return document
+
+
+def _too_deep() -> str:
+    return f"tables and lists stand in each other more than {_DEEPEST} deep"
 
 
 def value_text(value: object) -> str:
@@ -16,7 +47,10 @@ def value_text(value: object) -> str:
     """
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, int | float):
+    if isinstance(value, int):
+        # Python prints no integer of more digits than it likes to read, but for those of base 16.
+        return repr(value) if value.bit_length() <= _MOST_BITS else hex(value)
+    if isinstance(value, float):
         return repr(value)  # Python's inf and nan are TOML's
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -6,13 +6,14 @@ import math
 import shlex
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from springline.runner.commands.options import Changes, overrides
 from springline.runner.terminal import complain, console, print_json, print_table, say
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 _LONG = 3600.0
 _LARGE = 10e9
 _SHOWN_KEYS = 5
+_BEAT = 10.0
+_FLAWS = 20  # parts that are named when they are not whole
 _PACKAGED = "gains, laws, payload_and_phase, stability_map"  # here, for the help must not load all that lists them
 
 
@@ -35,6 +38,7 @@ def batch(
             "-o", "--output", metavar="DIR", show_default="results/SWEEP", help="Folder or URL of the dataset."
         ),
     ] = "",
+    changes: Changes = None,
     jobs: Annotated[
         int | None, typer.Option("--jobs", min=1, show_default="one per processor", help="Threads.")
     ] = None,
@@ -51,41 +55,50 @@ def batch(
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Draw figures.")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print what became of the runs as JSON.")] = False,
 ) -> None:
-    """Simulate every run of a sweep; write a table with one row a run, and a summary.
+    """Simulate every run of a sweep into one table, one row a run.
 
-    Ctrl-C, and even a crash, loses no more than the runs under way: --resume goes on from there.
+    A summary and figures come with it. Ctrl-C, and even a crash, loses no more than the runs under way: --resume goes
+    on from there.
     """
-    from springline.runner.batch import estimate, open_pool, run_sweep, versions
+    from springline.runner.batch import estimate, open_pool, refuse_oversized, run_sweep, versions
     from springline.runner.dataset import Dataset, place
     from springline.runner.plan import Plan
     from springline.runner.sweep import load_sweep
 
-    loaded = load_sweep(sweep)
+    loaded = load_sweep(sweep, overrides(changes, sweep))
     for note in loaded.scenario.notes:
         complain(note)
     plan = Plan(loaded)
     destination = output or str(Path("results", Path(sweep).stem))
     dataset = Dataset(place(destination))
-    dataset.is_begun(resume=resume)
+    begun = dataset.is_begun(resume=resume)
     if dry_run:
         with open_pool(jobs, scheduler) as pool:
             cost = estimate(plan, pool.threads)
             _describe(plan, cost, pool, destination, as_json=as_json)
         return
-    again = shlex.join(["springline", "batch", sweep, "-o", destination, "--resume"])
-    with open_pool(jobs, scheduler) as pool, dataset.place.locked():
-        plan = dataset.begin(plan, versions(), resume=resume)
-        done = dataset.done(plan)
-        try:
-            _warn(estimate(plan, pool.threads, plan.runs - sum(plan.chunk(k).runs for k in done)), again)
-            with _progress(plan, quiet=as_json) as report:
-                tally = run_sweep(plan, dataset, pool, done, report)
-        except KeyboardInterrupt as error:
-            pool.stop()
-            held = sum(plan.chunk(k).runs for k in dataset.done(plan))
-            complain(f"stopped: {held:,} of {plan.runs:,} runs are stored; continue with: {again}")
-            raise typer.Exit(130) from error
-        _finish(plan, dataset, tally, again, plot=plot, as_json=as_json)
+    sets = [word for change in changes or [] for word in ("--set", change)]
+    again = shlex.join(["springline", "batch", sweep, *sets, "-o", destination, "--resume"])
+    with open_pool(jobs, scheduler) as pool:
+        if not begun:  # else what is left to do is known when its parts have been looked at
+            refuse_oversized(plan, dataset.place, pool.threads)
+        with dataset.place.locked():
+            plan = dataset.begin(plan, versions(), resume=resume)
+            said = Said(_FLAWS)
+            done = dataset.done(plan, said.line, Heartbeat("checking the parts that are there").checked)
+            said.rest("more parts are not whole")
+            try:
+                left = plan.runs - sum(plan.chunk(k).runs for k in done)
+                refuse_oversized(plan, dataset.place, pool.threads, left)
+                _warn(estimate(plan, pool.threads, left), again)
+                with _progress(plan, quiet=as_json) as report:
+                    tally = run_sweep(plan, dataset, pool, done, report)
+            except KeyboardInterrupt as error:
+                pool.stop()
+                held = sum(plan.chunk(k).runs for k in done)
+                complain(f"stopped: {held:,} of {plan.runs:,} runs are stored; continue with: {again}")
+                raise typer.Exit(130) from error
+            _finish(plan, dataset, done, tally, again, plot=plot, as_json=as_json)
 
 
 def _describe(plan: Plan, cost: Estimate, pool: Pool, destination: str, *, as_json: bool) -> None:
@@ -128,13 +141,15 @@ def _warn(cost: Estimate, again: str) -> None:
         )
 
 
-def _finish(plan: Plan, dataset: Dataset, tally: Tally, again: str, *, plot: bool, as_json: bool) -> None:
+def _finish(
+    plan: Plan, dataset: Dataset, done: set[int], tally: Tally, again: str, *, plot: bool, as_json: bool
+) -> None:
     """Summary and last words; exits with 1 if something failed."""
     from springline.runner.summary import metric_rows, outcome_rows, summarize, worst_rows
 
     problems = [f"failed: {failure}" for failure in tally.failures]
     if tally.found + tally.done:
-        summary = summarize(plan, dataset)
+        summary = summarize(plan, dataset, done)
         try:
             write_summary(plan, dataset, summary, plot=plot)
         except OSError as error:  # the runs are safe, and what lost some of them is told below
@@ -178,15 +193,80 @@ def _write_figures(plan: Plan, dataset: Dataset, summary: Summary) -> list[str]:
     return names
 
 
+class Heartbeat:
+    """A line on stderr every ten seconds, for those who watch no bar: a log, a pipe, a job in the background.
+
+    what   what is being done
+    clock  seconds since whenever
+    """
+
+    def __init__(self, what: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self._what = what
+        self._clock = clock
+        self._start = self._last = clock()
+
+    def line(self, text: Callable[[float], str]) -> None:
+        """Say how it stands, if it is time: `text` is asked for it, with the seconds that have gone by."""
+        now = self._clock()
+        if now - self._last >= _BEAT:
+            self._last = now
+            complain(f"{self._what}: {text(now - self._start)}")
+
+    def checked(self, done: int, of: int) -> None:
+        """Say how many parts have been checked."""
+        self.line(lambda seconds: f"{done:,} of {of:,}")
+
+
+class Said:
+    """Lines on stderr, of which there may be too many: the first ones, then how many more there were."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._count = 0
+
+    def line(self, text: str) -> None:
+        """Say a line."""
+        self._count += 1
+        if self._count <= self._most:
+            complain(text)
+
+    def rest(self, what: str) -> None:
+        """Say how many lines were not said."""
+        if self._count > self._most:
+            complain(f"{self._count - self._most:,} {what}")
+
+
 @contextmanager
-def _progress(plan: Plan, *, quiet: bool) -> Iterator[Report]:
-    """A bar with runs/s, what became of the runs and the time left, where somebody watches."""
+def _progress(plan: Plan, *, quiet: bool, clock: Callable[[], float] = time.monotonic) -> Iterator[Report]:
+    """How a sweep stands: a bar where somebody watches, unless stdout is for JSON; else a line now and then on stderr.
+
+    Both tell runs/s, what became of the runs and the time left.
+    """
+    per_run = sum(group.runs * group.work.settings.steps for group in plan.groups) / plan.runs
+    start = clock()
+
+    def rate(steps: int) -> float:
+        return steps / per_run / max(clock() - start, 1e-9)
+
+    def counts(tally: Tally, steps: int) -> str:
+        return (
+            f"{rate(steps):,.0f} runs/s · {tally.found + tally.done:,} done · {tally.failed:,} failed · "
+            f"{tally.diverged:,} diverged"
+        )
+
     if quiet or not sys.stdout.isatty():
-        yield lambda tally, steps: None
+        heartbeat = Heartbeat(plan.sweep.source, clock)
+
+        def say_line(tally: Tally, steps: int) -> None:
+            share = (tally.found + steps / per_run) / plan.runs
+            left = (1.0 - share) * plan.runs / max(rate(steps), 1e-9)
+            known = f" · {time_text(left)} left" if steps else ""
+            heartbeat.line(lambda seconds: f"{100 * share:.0f} % of {plan.runs:,} runs · {counts(tally, steps)}{known}")
+
+        yield say_line
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    total = sum(group.runs * group.work.settings.steps for group in plan.groups)
     bar = Progress(
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
@@ -196,20 +276,11 @@ def _progress(plan: Plan, *, quiet: bool) -> Iterator[Report]:
         console=console(),
         transient=True,
     )
-    start = time.monotonic()
     with bar:
-        task = bar.add_task("", total=total, counts="")
-
-        def report(tally: Tally, steps: int) -> None:
-            per_run = total / plan.runs
-            rate = steps / per_run / max(time.monotonic() - start, 1e-9)
-            counts = (
-                f"{rate:,.0f} runs/s · {tally.found + tally.done:,} done · {tally.failed:,} failed · "
-                f"{tally.diverged:,} diverged"
-            )
-            bar.update(task, completed=tally.found * per_run + steps, counts=counts)
-
-        yield report
+        task = bar.add_task("", total=per_run * plan.runs, counts="")
+        yield lambda tally, steps: bar.update(
+            task, completed=tally.found * per_run + steps, counts=counts(tally, steps)
+        )
 
 
 def replay(
@@ -225,24 +296,30 @@ def replay(
     force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
 ) -> None:
-    """Simulate one run of a dataset again, with its trajectory and figures.
+    """Simulate one run of a dataset again, trajectory included.
 
     The metrics must come out as the dataset has them, to the last bit; if they do not, the exit code is 1.
     """
-    from springline.runner.commands.run import OUTPUTS, print_metrics, refuse_occupied
+    from springline.runner.commands.options import refuse_occupied
+    from springline.runner.commands.run import OUTPUTS, print_metrics
     from springline.runner.dataset import Dataset, place
+    from springline.runner.locate import expect_kind
     from springline.runner.plots import figure_files, run_figures
-    from springline.runner.replay import differences, recorded, replayed
+    from springline.runner.replay import differences, files_of, recorded, replayed, stored_plan
     from springline.runner.simulate import simulate
     from springline.runner.storage import table_files, units, write_folder
 
+    expect_kind("dataset", dataset)
     source = Dataset(place(dataset))
     folder = output or Path("results", f"{Path(dataset).name}-{run}")
     refuse_occupied(folder, force=force)
-    scenario = replayed(source, run)
-    row = recorded(source, run)
+    plan = stored_plan(source)
+    scenario = replayed(plan, run)
+    row, flaw = recorded(source, plan, run)
+    if flaw:
+        complain(flaw)
     result = simulate(scenario)
-    files = {"scenario.toml": scenario.to_toml(folder).encode()}
+    files = files_of(scenario)
     if plot:
         for name, figure in run_figures(scenario, result).items():
             files |= figure_files(f"figures/{name}", figure)

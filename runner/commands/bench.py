@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from springline.runner.commands.run import refuse_files
+from springline.runner.commands.options import expect_folder
 from springline.runner.errors import InputError, Problem
 from springline.runner.terminal import print_json, print_table, progress, say
 
@@ -29,16 +29,17 @@ def bench(
     ] = "",
     as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
 ) -> None:
-    """Measure springline and its alternatives on this machine: time, agreement, compile time.
+    """Time springline and its alternatives on this machine.
 
-    Exit code 1 if a contender's result differs from springline's by more than its tolerance.
+    Evaluations, agreement, compile times. Exit code 1 if a contender's result differs from springline's by more than
+    its tolerance.
     """
     from springline.benchmarks.contenders import CONTENDERS
     from springline.benchmarks.harness import QUICK, UNITS, Effort, measure
     from springline.runner.bench import COLUMNS, OUTPUTS, files, machine_lines, plain, table
     from springline.runner.storage import write_folder
 
-    refuse_files(output)
+    expect_folder(output)
     chosen = _chosen(only, CONTENDERS)
     with progress("measuring", quiet=as_json) as report:
         result = measure(QUICK if quick else Effort(), chosen, report)

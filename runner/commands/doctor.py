@@ -18,7 +18,10 @@ _DURATION = 0.05  # s: long enough for every state to have moved
 def doctor(
     as_json: Annotated[bool, typer.Option("--json", help="Print the checks as JSON.")] = False,
 ) -> None:
-    """Check compiler, cache, packages, and that both engines compute the same bits here."""
+    """Check compiler, cache, packages and both engines.
+
+    The engines must compute the same bits on this machine.
+    """
     rows = [*checks(), *map(_package, PACKAGES)]
     if all(row.ok for row in rows):
         rows.append(_engines())

@@ -13,8 +13,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from springline.codegen.manifest import read_manifest, write_tree
-from springline.runner.commands.options import TUNABLE, AsJson, Force, ScenarioName, tunable_names
-from springline.runner.commands.run import refuse_files
+from springline.runner.commands.options import (
+    TUNABLE,
+    AsJson,
+    Changes,
+    Force,
+    ScenarioName,
+    expect_folder,
+    overrides,
+    refuse_results,
+    tunable_names,
+)
 from springline.runner.errors import InputError, Problem
 from springline.runner.terminal import complain, print_json, say
 
@@ -54,6 +63,7 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         scenario: ScenarioName,
         part: PartOption,
         output: Output = Path("fmu"),
+        changes: Changes = None,
         name: Name = None,
         tunable: Tunable = "all",
         force: Force = False,
@@ -63,9 +73,10 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         from springline.runner.scenario import load_scenario
         from springline.runner.tables import kernel_tables
 
-        refuse_files(output)
+        expect_folder(output)
+        refuse_results(output)
         others = _earlier(output, keep_edited=force)
-        loaded = load_scenario(scenario)
+        loaded = load_scenario(scenario, overrides(changes, scenario))
         stem = re.sub(r"\W", "_", Path(scenario).stem, flags=re.ASCII)
         begin = stem if stem[:1].isalpha() else f"scenario_{stem}"
         identifier = name or re.sub("_+", "_", f"{begin}_{part}_fmi{version}")
@@ -88,10 +99,10 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         others.pop(path, None)
         kept = {name: (output / name).read_bytes() for name in others}
         manifest = {"kind": _KIND, "fmus": sorted([*others.values(), entry], key=lambda fmu: str(fmu["name"]))}
-        changes = write_tree(output, {**kept, path: content}, manifest, force=force)
+        written = write_tree(output, {**kept, path: content}, manifest, force=force).written
+        done = "written" if path in written else "unchanged"
         for note in loaded.notes if part is not Part.controller else ():
             complain(note)
-        done = "written" if path in changes.written else "unchanged"
         if as_json:
             print_json(f"export fmu{version}", [{"path": path, "change": done}], {})
         else:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import StrEnum
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Annotated, Any
 
 import typer
 
-from springline.codegen.manifest import MANIFEST, Stale, check_tree, summary, write_tree
-from springline.runner.commands.options import TUNABLE, AsJson, Force, ScenarioName, tunable_names
-from springline.runner.commands.run import refuse_files
+from springline.codegen.manifest import MANIFEST, Stale, check_tree, read_manifest, summary, write_tree
+from springline.runner.commands.options import (
+    TUNABLE,
+    AsJson,
+    Changes,
+    Force,
+    ScenarioName,
+    expect_folder,
+    overrides,
+    refuse_results,
+    tunable_names,
+)
 from springline.runner.errors import InputError, Problem
 from springline.runner.terminal import print_json, say
 
@@ -46,6 +55,7 @@ def _command(name: str, description: str, default: Any = ...) -> Callable[..., N
     def command(
         scenario: ScenarioName = default,
         output: Output = Path("generated"),
+        changes: Changes = None,
         check: Check = False,
         tunable: Tunable = "none",
         prefix: Prefix = "springline",
@@ -58,8 +68,8 @@ def _command(name: str, description: str, default: Any = ...) -> Callable[..., N
         from springline.codegen.vectors import Overflow
         from springline.runner.scenario import load_scenario
 
-        refuse_files(output)
-        loaded = load_scenario(scenario)
+        expect_folder(output, writable=not check)
+        loaded = load_scenario(scenario, overrides(changes, scenario))
         names = tunable_names(tunable)
         try:
             export = bind(loaded.structure(), loaded.values(), tunable=names, prefix=prefix, real=real.value)
@@ -68,8 +78,15 @@ def _command(name: str, description: str, default: Any = ...) -> Callable[..., N
             raise InputError(Problem(scenario, error.key, str(error), repr(error.value))) from error
         except ValueError as error:  # the scenario's numbers are in their bounds: --tunable, --prefix or --real
             raise InputError(Problem(f"springline {name}", "", str(error))) from error
+        if not check:
+            refuse_results(output)
         if check:
-            _report_check(name, output, check_tree(output, files, manifest), len(files), as_json)
+            stale = check_tree(output, files, manifest)
+            _report_check(name, output, stale, len(files), as_json)
+            if stale and not as_json:
+                _report_options(output, manifest, files)
+            if stale:
+                raise typer.Exit(1)
         else:
             _write(name, output, files, manifest, force, as_json)
 
@@ -79,7 +96,9 @@ def _command(name: str, description: str, default: Any = ...) -> Callable[..., N
 
 generate = _command(
     "generate",
-    "Generate C for a scenario: controller, plant and the functions of the model, its parameters as constants.",
+    """Generate the C of a scenario: controller, plant and model.
+
+    Its parameters are constants, but for those that --tunable names.""",
     DEFAULT,
 )
 export_c = _command("export c", "The same files as `springline generate SCENARIO`.")
@@ -108,5 +127,28 @@ def _report_check(name: str, output: Path, stale: list[Stale], files: int, as_js
         say(f"{output} holds no generated files: the same command without --check writes them")
     else:
         say(summary(output, stale))
-    if stale:
-        raise typer.Exit(1)
+
+
+def _report_options(output: Path, manifest: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
+    """Say which options a stale folder was made with, where they are not those of this command."""
+    there = read_manifest(output, None)
+    if there is None:
+        return
+    made = _options(there, [entry["path"] for entry in there["files"]])
+    asked = _options(manifest, list(files))
+    other = [f"{option} {value}" for option, value in made.items() if value != asked[option]]
+    if other:
+        say(f"it was made with {' '.join(other)}: check it with the same")
+
+
+def _options(manifest: Mapping[str, Any], paths: list[str]) -> dict[str, str]:
+    """The options that an export was made with, as its manifest and files tell."""
+    entries = manifest.get("parameters")
+    entries = [entry for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
+    free = [str(entry.get("name")) for entry in entries if entry.get("binding") == "run"]
+    headers = [PurePosixPath(path).stem for path in paths if path.startswith("include/")]
+    return {
+        "--tunable": "none" if not free else "all" if len(free) == len(entries) else ",".join(free),
+        "--prefix": headers[0] if headers else "?",
+        "--real": "float" if "src/sl_mathf.h" in paths else "double",
+    }

@@ -30,7 +30,7 @@ def list_(
     what: Annotated[What, typer.Argument(help="Which list.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
-    """List mechanisms, reaching laws, parameters or packaged scenarios."""
+    """List mechanisms, laws, parameters or packaged scenarios."""
     rows = {"mechanisms": mechanisms, "laws": laws, "parameters": parameters, "scenarios": scenarios}[what.value]()
     if as_json:
         print_json("list", rows, {})

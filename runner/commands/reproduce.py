@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from springline.runner.commands.run import refuse_files
+from springline.runner.commands.options import Changes, expect_folder, overrides, refuse_results
 from springline.runner.errors import InputError, unknown
 from springline.runner.terminal import number, print_json, print_table, progress, say
 
@@ -20,12 +20,15 @@ def reproduce(
         list[int] | None,
         typer.Option("--group", metavar="N", help="A group of Table 2 alone. May be given again.", show_default="all"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that were edited since.")] = False,
+    changes: Changes = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace files that were edited since, and a report that has more.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print Table 4 as JSON.")] = False,
 ) -> None:
-    """Repeat the reference paper: its runs, tables, figures and claims, in one report.
+    """Repeat the reference paper, number by number.
 
-    A claim that fails is a result too, and the exit code is 0.
+    Its runs, tables, figures and claims, in one report. A claim that fails is a result too, and the exit code is 0.
     """
     from springline.runner.paper import reproduce as repeat
     from springline.runner.paper_cases import GROUPS
@@ -34,9 +37,11 @@ def reproduce(
     wrong = [str(item) for item in group or [] if str(item) not in known]
     if wrong:
         raise InputError(*(unknown("springline reproduce", "--group", "group", item, known) for item in wrong))
-    refuse_files(output)
+    expect_folder(output)
+    refuse_results(output)
+    changed = overrides(changes, "the paper's scenarios")
     with progress("reproducing the paper", quiet=as_json) as report:
-        done = repeat(output, group, force=force, progress=report)
+        done = repeat(output, group, overrides=changed, force=force, progress=report)
     if as_json:
         print_json("reproduce", done.table, {})
         return
@@ -52,4 +57,6 @@ def reproduce(
     ]
     print_table(["run", "joint", "measure", "paper", "here"], rows, right=("paper", "here"))
     print_table(["", "claim", "verdict"], [[str(f.number), f.claim, f.verdict] for f in done.findings])
+    if done.changes.removed:
+        say(f"removed: {len(done.changes.removed)} files of the earlier reproduction")
     say(f"report: {done.report}")

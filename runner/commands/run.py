@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from springline.runner.commands.options import Changes, overrides, refuse_occupied
 from springline.runner.errors import InputError, Problem
 from springline.runner.terminal import complain, number, print_json, print_table, progress, say
 
@@ -49,30 +50,24 @@ def run(
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", show_default="results/SCENARIO", help="Folder for the results."),
     ] = None,
-    changes: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help=("Override a key of the scenario, the value as in TOML: control.delta=0.02. May be given again."),
-        ),
-    ] = None,
+    changes: Changes = None,
     engine: Annotated[Engine, typer.Option(help="The engine.")] = Engine.lanes,
     form: Annotated[Format, typer.Option("--format", help="Format of the tables.")] = Format.parquet,
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Draw figures.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
 ) -> None:
-    """Simulate one scenario; write its trajectory, metrics and figures.
+    """Simulate one scenario; write its tables and figures.
 
-    A run that diverges is a result: it is reported with the quantity and the time, and the exit code is 0.
+    Trajectory, metrics, figures and the resolved scenario go into one folder. A run that diverges is a result: it is
+    reported with the quantity and the time, and the exit code is 0.
     """
     from springline.runner.locate import packaged_scenarios
-    from springline.runner.scenario import load_scenario, parse_set
+    from springline.runner.scenario import load_scenario
     from springline.runner.simulate import simulate
     from springline.runner.storage import table_files, units, write_folder
 
-    loaded = load_scenario(scenario, dict(parse_set(change, scenario) for change in changes or []))
+    loaded = load_scenario(scenario, overrides(changes, scenario))
     packaged = scenario in packaged_scenarios()
     folder = output or Path("results", scenario if packaged else Path(scenario).stem)
     refuse_occupied(folder, force=force)
@@ -94,21 +89,6 @@ def run(
     print_metrics(result, loaded.system().joints)
     say(f"results: {folder}")
     say(result.message)
-
-
-def refuse_occupied(folder: Path, *, force: bool) -> None:
-    """Raise InputError if `folder` cannot be one, or holds something and `force` does not say that this is meant."""
-    refuse_files(folder)
-    if folder.is_dir() and not force and any(folder.iterdir()):
-        text = "is not empty: choose another folder with -o, or replace its results with --force"
-        raise InputError(Problem(str(folder), "", text))
-
-
-def refuse_files(folder: Path) -> None:
-    """Raise InputError if a file stands where `folder`, or a folder on the way to it, should be."""
-    place = next(place for place in (folder, *folder.parents) if place.exists())
-    if not place.is_dir():
-        raise InputError(Problem(str(place), "", "is a file where a folder was expected; choose another with -o"))
 
 
 def _refuse_own_inputs(folder: Path, source: str, scenario: Scenario) -> None:

@@ -174,6 +174,30 @@ def test_two_exports_in_one_program(export: Folder, tmp_path: Path, require_tool
     run(compile_c(require_tool("gcc"), units, tmp_path / "both", *WARNINGS))
 
 
+@pytest.mark.parametrize(
+    ("compiler", "language"),
+    [("gcc", ["-std=c99"]), ("clang", ["-std=c99"]), ("g++", ["-x", "c++", "-std=c++17"]),
+     ("clang++", ["-x", "c++", "-std=c++17"])],
+)  # fmt: skip
+def test_exports_fit_into_one_translation_unit(
+    compiler: str, language: list[str], export: Folder, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    """Four exports, two of them single, and the system's mathematics behind them: as C and as C++ the same bits."""
+    names = ["baked", "single", "tunable", "single_tunable"]
+    folders = [export(name) for name in names]
+    unit = tmp_path / "unit.c"
+    parts = [folder / "src" / f"{prefix}{end}.c" for folder, prefix in folders for end in ("", "_model")]
+    parts[2:4] = reversed(parts[2:4])  # in any order
+    unit.write_text("".join(f'#include "{part}"\n' for part in parts) + "#include <math.h>\n")
+    includes = [f"-I{folder / inner}" for folder, _ in folders for inner in ("include", "src")]
+    flags = [*language, "-O1", "-ffp-contract=off", *STRICT, *includes]
+    run(require_tool(compiler), *flags, "-c", unit, "-o", tmp_path / "unit.o")
+    for folder, _ in folders:
+        check = [*includes, *FLAGS, tmp_path / "unit.o", folder / "self_check.c", "-o", tmp_path / "check"]
+        run(require_tool("gcc"), *check)
+        assert "all bits as expected" in run(tmp_path / "check", folder / "test_vectors.txt")
+
+
 def test_wrong_builds_are_refused_or_found_out(
     export: Folder, tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
@@ -226,7 +250,7 @@ class Library:
         self._prefix = prefix
         header = without_comments(folder / "include" / f"{prefix}.h")
         real = ctypes.c_double if f"typedef double {prefix}_real" in header else ctypes.c_float
-        self.types: dict[str, Any] = {"int": ctypes.c_int, f"{prefix}_real": real}
+        self.types: dict[str, Any] = {"int32_t": ctypes.c_int32, f"{prefix}_real": real}
         for body, name in re.findall(r"typedef struct \w+ \{(.*?)\} (\w+);", header, re.DOTALL):
             fields = [
                 (field, self.types[kind] * int(count) if count else self.types[kind])
@@ -499,6 +523,52 @@ def test_limits_hold_and_are_flagged(library: Callable[[str], Library]) -> None:
     assert case.command.U_rotation == case.diagnostics.U_s_rotation + case.diagnostics.U_f_rotation
 
 
+@pytest.mark.parametrize("name", ["tunable", "single_tunable"])
+def test_a_law_that_a_max_limits_is_flagged(name: str, library: Callable[[str], Library]) -> None:
+    """Where the flag changes as the limit moves is the size of what the law wishes, equation (18) by hand."""
+    lib = library(name)
+    free = Case(lib, control_a_max_lift=math.inf, control_a_max_rotation=math.inf)
+    assert free.step() == "OK"
+    assert (free.diagnostics.a_limited_lift, free.diagnostics.a_limited_rotation) == (0, 0)
+    for joint, other_joint in (("lift", "rotation"), ("rotation", "lift")):
+        low, high = 1e-3, 1e8  # limits, and does not
+        for _ in range(100):
+            middle = 0.5 * (low + high)
+            case = Case(lib, **{f"control_a_max_{joint}": middle, f"control_a_max_{other_joint}": math.inf})
+            assert case.step() == "OK"
+            assert getattr(case.diagnostics, f"a_limited_{other_joint}") == 0
+            if getattr(case.diagnostics, f"a_limited_{joint}"):
+                low = middle
+            else:
+                assert values(case.command) == values(free.command)
+                high = middle
+        size = abs(getattr(free.diagnostics, f"sigma_{joint}"))
+        logarithm = math.log(10.0 * size**2 + 1.0)
+        wish = 3.0 * size ** (0.9 * max(size, 1.0)) + 5.0 * logarithm**1.5 + 12.0 * logarithm**0.5
+        assert high == pytest.approx(wish, rel=1e-12 if name == "tunable" else 1e-5)
+    case.measurement.q1_lift = math.nan
+    assert case.step() == "BAD_MEASUREMENT"
+    assert not any(values(case.diagnostics))
+
+
+def test_without_a_limit_the_flags_stay_and_are_zero(tmp_path: Path) -> None:
+    """The structure is the same whatever is baked; both signs of the error reach the limit where there is one."""
+    flags = {}
+    for a_max in (math.inf, 30.0):
+        loaded = load_scenario("paper/nominal", {"control.a_max": [a_max, a_max]})
+        folder = tmp_path / str(a_max)
+        write_tree(folder, *generate_files(bind(loaded.structure(), loaded.values())))
+        case = Case(Library(folder, "springline", tmp_path / f"{a_max}.so"))
+        seen = []
+        for shift in (-1.0, 1.0):
+            case.measure()
+            case.measurement.q1_rotation = case.reference.q1d_rotation + shift
+            assert case.step() == "OK"
+            seen.append((case.diagnostics.a_limited_lift, case.diagnostics.a_limited_rotation))
+        flags[a_max] = seen
+    assert flags == {math.inf: [(0, 0), (0, 0)], 30.0: [(1, 1), (1, 1)]}
+
+
 def test_what_overflows_never_becomes_a_limit(library: Callable[[str], Library]) -> None:
     """fmin(fmax(NaN, -U), U) is -U: a limiter would hide an overflow, so what stands before it is looked at."""
     limits = {"control_U_max_lift": 50.0, "control_U_max_rotation": 50.0}
@@ -661,13 +731,89 @@ def test_single_precision_keeps_a_parameter_that_looks_like_a_guard(tmp_path: Pa
     assert abs(case.command.U_lift) == 700.0
 
 
-def test_structures_of_tables_export_without_their_data(tmp_path: Path) -> None:
-    """A base motion from a table is an input of the C; the export's own signals leave it at zero and say so."""
-    loaded = load_scenario("ship/vessel_10hz")
-    write_tree(tmp_path / "c", *generate_files(bind(loaded.structure(), loaded.values())))
-    assert "table is not part of the export" in (tmp_path / "c" / "include" / "springline.h").read_text()
-    units = sources(tmp_path / "c", "springline", "self_check.c")
-    run(compile_c("cc", units, tmp_path / "check", *WARNINGS, "-O1"), tmp_path / "c" / "test_vectors.txt")
+def test_structures_of_tables_export_without_their_data_and_say_so(tmp_path: Path) -> None:
+    """Signals from tables are inputs of the C; its own are zero there: header, README and what main prints say it."""
+    record = tmp_path / "reference.csv"
+    record.write_text("t,lift\n" + "".join(f"{k},{0.01 * k}\n" for k in range(20)))
+    wish = {"reference.kind": "table", "reference.path": str(record), "reference.columns": {"t": "t", "lift": "lift"}}
+    tracked = load_scenario("paper/nominal", wish)
+    for name, loaded, table in (
+        ("base", load_scenario("ship/vessel_10hz"), "base motion table is"),
+        ("reference", tracked, "reference table is"),
+    ):
+        folder = tmp_path / name
+        write_tree(folder, *generate_files(bind(loaded.structure(), loaded.values())))
+        for file in ("include/springline.h", "README.md"):
+            assert f"{table} not part of the export" in (folder / file).read_text(), (name, file)
+        units = sources(folder, "springline", "self_check.c")
+        run(compile_c("cc", units, tmp_path / "check", *WARNINGS, "-O1"), folder / "test_vectors.txt")
+        main = compile_c("cc", [folder / "src" / "springline.c", folder / "main.c"], tmp_path / "main", *WARNINGS)
+        done = subprocess.run([main, "1"], capture_output=True, text=True, check=True)
+        assert f"{table} not part of the export: main runs with zero" in done.stderr
+        printed = columns(done.stdout)
+        assert any(printed["q1d_rotation"]) == (name == "base")
+
+
+# --- sampling ------------------------------------------------------------------------------------------------
+
+
+_DELAYED = """
+#include <stdio.h>
+#include <stdlib.h>
+#include "springline.h"
+/* delayed PERIOD DELAY, in plant steps of 0.1 ms: prints when the arm is beyond 10 m or 10 rad, or 0 if it stays */
+int main(int argc, char **argv) {
+  const int period = atoi(argv[1]), delay = atoi(argv[2]);
+  springline_controller controller;
+  springline_state arm;
+  springline_reference wanted;
+  springline_base base;
+  springline_command sent[32] = {{0.0}}, given = {0.0};
+  int k;
+  if (argc != 3 || springline_init(&controller, &springline_default_config) != SPRINGLINE_OK) return 1;
+  if (springline_start(&controller, &arm) != SPRINGLINE_OK) return 1;
+  for (k = 0; k < 120000; k++) {
+    springline_measurement seen = {arm.q1_lift, arm.q1_rotation, arm.dq1_lift, arm.dq1_rotation, arm.dq2_lift,
+                                   arm.dq2_rotation};
+    int status = springline_signals(&controller, 1e-4 * k, &wanted, &base);
+    if (k % period == 0) status |= springline_step(&controller, &wanted, &seen, &given, NULL);
+    sent[k % 32] = given;
+    status |= springline_plant_step(&controller, &arm, &sent[(k - delay + 32) % 32], NULL, 1e-4);
+    if (status != 0 || arm.q1_lift > 10.0 || arm.q1_lift < -10.0 || arm.q1_rotation > 10.0 || arm.q1_rotation < -10.0) {
+      printf("%g\\n", 1e-4 * k);
+      return 0;
+    }
+  }
+  printf("0\\n");
+  return 0;
+}
+"""
+
+
+def test_the_delays_that_the_documents_promise_survive_and_the_next_ones_do_not(export: Folder, tmp_path: Path) -> None:
+    """Twelve seconds of the nominal scenario, in the C that is exported, against the table in both documents."""
+    folder, prefix = export("baked")
+    (tmp_path / "delayed.c").write_text(_DELAYED)
+    units = [folder / "src" / f"{prefix}.c", tmp_path / "delayed.c"]
+    program = compile_c("cc", units, tmp_path / "delayed", *FLAGS)
+    root = Path(__file__).parents[2]
+    survived: dict[int, int] = {}
+    for document in (root / "docs" / "embedding.md", folder / "README.md"):
+        text = document.read_text()
+        assert "any sample rate" not in text
+        rows = re.findall(r"^\| ((?:[\d.]+ ms(?:, )?)+) \| ([\d.]+) ms \|$", text, re.MULTILINE)
+        table = {
+            round(10 * float(period)): round(10 * float(delay))
+            for periods, delay in rows
+            for period in re.findall(r"[\d.]+", periods)
+        }
+        assert survived in ({}, table)
+        survived = table
+    assert survived == {1: 7, 5: 7, 10: 5, 20: 1}
+    for period, delay in survived.items():
+        assert float(run(program, str(period), str(delay))) == 0.0, (period, delay)
+    for period, delay in ((5, 8), (10, 6), (20, 2), (21, 0), (10, 10)):
+        assert 0.0 < float(run(program, str(period), str(delay))) < 12.0, (period, delay)
 
 
 @pytest.mark.parametrize("law", ["double_power", "power"])

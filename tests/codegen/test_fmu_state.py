@@ -249,6 +249,25 @@ def test_impossible_states_are_refused_and_change_nothing(build: Build, open_fmu
     assert client.get(names) == after
 
 
+def test_impossible_places_inside_a_step(build: Build, open_fmu: Open) -> None:
+    client = open_fmu(build("plant", 3)).start()
+    client.step(0.0, 7.5 * STEP)
+    state = client.slave.getFMUState()
+    good = Bytes(client.slave.serializeFMUState(state), len(client.references))
+    client.slave.freeFMUState(state)
+    assert (good.fields["step"], good.fields["between"]) == (7, 1)
+    for change in (
+        *({"between": between} for between in (0, -1, 2)),
+        *({"step": step} for step in (6, 8)),
+        *({"time": time, "clock": time, "v0": time} for time in (7 * STEP, 8 * STEP, 8.5 * STEP)),
+    ):
+        with pytest.raises(Exception, match="Deserialize"):
+            client.slave.deserializeFMUState(good.packed(**change))
+        assert "this is no state that can be" in client.messages[-1], change
+    moved = {"time": 7.4 * STEP, "clock": 7.4 * STEP, "v0": 7.4 * STEP}
+    client.slave.freeFMUState(client.slave.deserializeFMUState(good.packed(**moved)))
+
+
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("part", ["controller", "plant", "loop"])
 @pytest.mark.parametrize("start", [0.0, 1.7e9])

@@ -155,6 +155,25 @@ def test_uneven_communication_steps(build: Build, open_fmu: Open, shaken: Progra
         assert uneven.get(["time"]) == [times[-1]]
 
 
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("start", [0.0, UNIX])
+def test_the_stop_time_is_reached_by_sums_and_not_passed(
+    build: Build, open_fmu: Open, shaken: Program, values_of: Values, start: float, version: int
+) -> None:
+    """At Unix times sums of 1.1 ms run ahead, by 14 us in 200 steps."""
+    settings, length, steps = CONTINUOUS if version == 2 else SAMPLED, 11 * STEP, 200
+    client = open_fmu(build("loop", version, settings)).start(start, stop=start + steps * length)
+    time = start
+    for _ in range(steps):
+        refused(client, lambda time=time: client.step(time - 0.5 * length, length), "but the instance is at")
+        client.step(time, length)
+        time += length
+    assert (time > start + steps * length + 1e-5) == (start == UNIX)
+    refused(client, lambda: client.step(time, length), "but the experiment stops at")
+    expected = own_run(shaken, values_of(shaken), settings is SAMPLED, steps=11 * steps, every=11 * steps)
+    assert client.get(columns(shaken)) == list(expected[-1])
+
+
 @pytest.mark.parametrize("factor", [1.004, 0.9995, 1.0008])
 def test_a_step_that_is_nearly_the_integrators_keeps_the_importers_time(
     build: Build, open_fmu: Open, factor: float
@@ -187,6 +206,14 @@ def test_start_times_too_coarse_for_the_step_are_errors(build: Build, open_fmu: 
     client.step(edge - 1.0, 0.5)
     refused(client, lambda: client.step(edge - 0.5, 1.0), "more than a hundredth of a step of")
     client.step(edge - 0.5, 0.25)
+
+
+def test_a_step_that_would_take_hours_is_refused(build: Build, open_fmu: Open) -> None:
+    client = open_fmu(build("loop", 3)).start()
+    refused(client, lambda: client.step(0.0, 1.1e9 * STEP), "more than 1000000000 steps of 0.0001 s")
+    client.step(0.0)
+    idle = open_fmu(build("controller", 3)).start()  # counting samples takes no time, and still has an end
+    refused(idle, lambda: idle.step(0.0, 1.1e9 * PERIOD), "more than 1000000000 steps of 0.001 s")
 
 
 @pytest.mark.parametrize("version", [2, 3])

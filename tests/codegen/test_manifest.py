@@ -2,14 +2,18 @@
 
 import json
 import math
+import multiprocessing
 import os
+import re
+import signal
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from springline.codegen.manifest import (
@@ -21,6 +25,7 @@ from springline.codegen.manifest import (
     summary,
     write_tree,
 )
+from springline.codegen.unfinished import workplace
 
 OLD = {"include/a.h": b"int a;\n", "src/a.c": b"int a = 1;\n", "src/gone/b.c": b"int b;\n"}
 NEW = {"include/a.h": b"int a;\n", "src/a.c": b"int a = 2;\n", "README.md": b"# a\n"}
@@ -149,6 +154,57 @@ def foreign_file(folder: Path) -> str:
 def foreign_manifest(folder: Path) -> str:
     (folder / "manifest.json").write_text('{"name": "a web page", "icons": []}')
     return "manifest.json: not written by springline"
+
+
+GARBAGE = {
+    "not text": b"\xff{",
+    "nothing": b"",
+    "deep lists": b"[" * 100_000,
+    "deep lists, closed": b'{"files": ' + b"[" * 100_000 + b"]" * 100_000 + b"}",
+    "deep tables": b'{"files":' * 100_000,
+    "a list": b"[]",
+    "no table": b"1",
+    "no files": b"{}",
+    "files that are none": b'{"files": 1}',
+    "a file that is none": b'{"files": [1]}',
+    "a file without a path": b'{"files": [{"sha256": "0"}]}',
+    "a file without a hash": b'{"files": [{"path": "a"}]}',
+    "a path that is none": b'{"files": [{"path": [1], "sha256": "0"}]}',
+    "a path with NUL": b'{"files": [{"path": "a\\u0000b", "sha256": "0"}]}',
+    "a path of half a character": b'{"files": [{"path": "\\ud800", "sha256": "0"}]}',
+    "a number of 5000 digits": b'{"files": ' + b"1" * 5000 + b"}",
+}
+
+
+@pytest.mark.parametrize("content", GARBAGE.values(), ids=GARBAGE.keys())
+def test_a_manifest_of_garbage_is_nobodys(content: bytes, folder: Path) -> None:
+    (folder / "manifest.json").write_bytes(content)
+    before = contents(folder)
+    (entry,) = (entry for entry in check_tree(folder, NEW, NEW_INFO) if entry.path == "manifest.json")
+    assert entry.kind == "changed"
+    with pytest.raises(FolderConflict, match=r"manifest\.json: not written by springline"):
+        write_tree(folder, NEW, NEW_INFO)
+    assert contents(folder) == before
+    write_tree(folder, NEW, NEW_INFO, force=True)
+    assert {path: contents(folder)[path] for path in NEW} == NEW
+
+
+@pytest.mark.parametrize("depth", [200, 900, 100_000])
+def test_a_manifest_with_deep_entries_of_its_own_is_compared(depth: int, folder: Path) -> None:
+    manifest = json.loads((folder / "manifest.json").read_bytes())
+    text = json.dumps(manifest | {"parameters": 0}).replace(
+        '"parameters": 0', f'"parameters": {"[" * depth}{"]" * depth}'
+    )
+    (folder / "manifest.json").write_text(text)
+    (entry,) = (entry for entry in check_tree(folder, OLD, OLD_INFO) if entry.path == "manifest.json")
+    assert entry.kind == "changed"
+
+
+def test_names_that_are_no_names_are_compared(folder: Path) -> None:
+    manifest = json.loads((folder / "manifest.json").read_bytes()) | {"parameters": [{"name": ["m3"]}]}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    (entry,) = check_tree(folder, OLD, OLD_INFO)
+    assert entry.detail.startswith("parameters")
 
 
 def garbled_manifest(folder: Path) -> str:
@@ -318,6 +374,42 @@ def test_failure_while_preparing_touches_nothing(folder: Path, monkeypatch: pyte
     assert contents(folder.parent) == before
 
 
+def killed_while_replacing(place: Path) -> None:
+    """A write that is killed when its first file is to be moved into place."""
+
+    def die(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    os.replace = die  # type: ignore[assignment]  # this process is ours alone
+    write_tree(place, NEW, NEW_INFO)
+
+
+def kill_a_write(place: Path) -> None:
+    process = multiprocessing.get_context("fork").Process(target=killed_while_replacing, args=(place,))
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+    assert list(place.glob(".springline-*")), "killed too early for this test to mean anything"
+
+
+@pytest.mark.parametrize("files", [OLD, NEW], ids=["nothing to do", "something to do"])
+def test_the_next_write_removes_what_a_killed_one_left(files: dict[str, bytes], folder: Path) -> None:
+    kill_a_write(folder)
+    (folder / ".springline-abcdefgh").mkdir()  # as version 0.1 left them
+    (folder / ".springline-notes").mkdir()
+    (folder / ".springline-notes/mine.txt").write_text("mine")
+    write_tree(folder, files, OLD_INFO if files is OLD else NEW_INFO)
+    assert contents(folder).keys() == {*files, "manifest.json", ".springline-notes/mine.txt"}
+
+
+def test_what_another_process_is_working_on_stays(folder: Path) -> None:
+    with workplace(folder) as busy:
+        (busy / "a.c").write_text("half of it")
+        write_tree(folder, NEW, NEW_INFO)
+        assert (busy / "a.c").read_text() == "half of it"
+    assert contents(folder).keys() == {*NEW, "manifest.json"}
+
+
 # --- checking --------------------------------------------------------------------------------------------
 
 
@@ -334,7 +426,7 @@ def test_every_kind_of_staleness(folder: Path) -> None:
         Stale("README.md", "missing", "is not there"),
         Stale("include/a.h", "edited", "edited since it was written"),
         Stale("manifest.json", "changed", 'hash "1" -> "2"; parameters.m3.value 40.0 -> 48.0'),
-        Stale("src/a.c", "changed", "1 of 1 lines would change"),
+        Stale("src/a.c", "changed", "1 of 1 lines are new, 1 go"),
         Stale("src/gone/b.c", "extra", "would no longer be written"),
     ]
     text = summary(folder, stale)
@@ -363,6 +455,43 @@ def test_long_differences_are_cut(folder: Path) -> None:
     info = OLD_INFO | {f"key{i}": i for i in range(9)}
     (entry,) = check_tree(folder, OLD, info)
     assert entry.detail == "key0 is new; key1 is new; key2 is new; key3 is new; key4 is new; and 4 more"
+
+
+def number_of_lines(text: str) -> tuple[int, int]:
+    """How many lines a detail says would come, and how many would go."""
+    found = re.search(r"(\d+) of \d+ lines are new, (\d+) go", text)
+    assert found, text
+    return int(found[1]), int(found[2])
+
+
+def detail_of_change(place: Path, old: str, new: str) -> str:
+    write_tree(place, {"a.c": old.encode()}, {})
+    (entry,) = (entry for entry in check_tree(place, {"a.c": new.encode()}, {}) if entry.path == "a.c")
+    return entry.detail
+
+
+def test_a_line_that_is_put_in_changes_no_other(tmp_path: Path) -> None:
+    lines = [f"double a{i};\n" for i in range(3000)]
+    changed = ["/* new */\n", *lines[:700], *lines[702:2000], "int b;\n", *lines[2000:]]
+    assert number_of_lines(detail_of_change(tmp_path, "".join(lines), "".join(changed))) == (2, 2)
+
+
+@settings(max_examples=30)
+@given(st.lists(st.sampled_from("abcd"), max_size=30), st.lists(st.sampled_from("abcd"), max_size=30))
+def test_lines_are_counted_as_diff_counts_them(
+    require_tool: Callable[..., str], tmp_path_factory: pytest.TempPathFactory, old: list[str], new: list[str]
+) -> None:
+    if old == new:
+        return
+    place, texts = tmp_path_factory.mktemp("diff"), ["".join(f"{word}\n" for word in words) for words in (old, new)]
+    (place / "old").write_text(texts[0])
+    (place / "new").write_text(texts[1])
+    tool = require_tool("diff", "apt-get install diffutils")
+    shown = subprocess.run(
+        [tool, "--minimal", place / "old", place / "new"], check=False, capture_output=True, text=True
+    ).stdout
+    signs = [line[0] for line in shown.splitlines()]
+    assert number_of_lines(detail_of_change(place / "tree", *texts)) == (signs.count(">"), signs.count("<"))
 
 
 # --- canonical JSON --------------------------------------------------------------------------------------

@@ -13,16 +13,15 @@ from springline.codegen.names import check_files, check_prefix
 def accepted(prefix: str) -> bool:
     try:
         check_prefix(prefix)
-    except ValueError as error:
-        assert re.search("choose another|expected|leave one out", str(error)), error
+    except ValueError:
         return False
     return True
 
 
 @pytest.mark.parametrize(
     "prefix",
-    ["arm", "Crane2", "springline", "my_arm", "controller", "plant", "loop", "floats", "stdio_arm", "mathematics", "slow",
-     "time_varying", "sea_state", "femur", "semi", "x", "fmu_test_loop_fmi2", "a" * 100],
+    ["arm", "Crane2", "springline", "my_arm", "controller", "plant", "loop", "floats", "stdio_arm", "mathematics",
+     "slow", "time_varying", "sea_state", "femur", "semi", "x", "fmu_test_loop_fmi2", "a" * 100],
 )  # fmt: skip
 def test_ordinary_names_are_fine(prefix: str) -> None:
     check_prefix(prefix)
@@ -34,13 +33,14 @@ def test_ordinary_names_are_fine(prefix: str) -> None:
         ("2fast", "no C identifier"), ("a-b", "no C identifier"), ("", "no C identifier"), ("été", "no C identifier"),
         ("arm\n", "no C identifier"), ("_arm", "no C identifier"),
         ("a" * 101, "100 at most"), ("my__arm", "two _"), ("arm_", "two _"),
-        ("float", "keyword"), ("Float", "keyword"), ("xor_eq", "keyword"), ("co_await", "keyword"), ("typeof", "keyword"),
+        ("float", "keyword"), ("Float", "keyword"), ("xor_eq", "keyword"), ("co_await", "keyword"),
+        ("typeof", "keyword"),
         ("stdio", "stdio.h"), ("Math", "math.h"), ("STDINT", "stdint.h"), ("unistd", "unistd.h"),
         ("xmmintrin", "xmmintrin.h"), ("vector", "vector.h"),
         ("m", "libm"), ("aux", "Windows"), ("Com1", "Windows"), ("test", "target"),
         ("mtx", "keep"), ("fe", "keep"), ("sem", "keep"), ("pthread_mutex", "keep"), ("atomic_flag", "keep"),
-        ("sl", "library inside"), ("SL_math", "library inside"), ("slf_arm", "library inside"), ("fmu", "library inside"),
-        ("casadi_arm", "library inside"),
+        ("sl", "library inside"), ("SL_math", "library inside"), ("slf_arm", "library inside"),
+        ("fmu", "library inside"), ("casadi_arm", "library inside"),
     ],
 )  # fmt: skip
 def test_refusals_say_why(prefix: str, why: str) -> None:
@@ -68,14 +68,16 @@ def test_no_word_that_a_compiler_refuses_as_a_name_is_accepted(
     tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
     """The compiler says itself which of these words are none (restrict is a keyword of C alone)."""
-    words = """alignas alignof asm auto bool break case catch char char16_t class concept const const_cast consteval
-        constexpr constinit continue co_await co_return co_yield decltype default delete do double dynamic_cast else enum
-        explicit export extern false float for friend goto if inline int long mutable namespace new noexcept nullptr
-        operator private protected public register reinterpret_cast requires return short signed sizeof static
+    words = """
+        alignas alignof asm auto bool break case catch char char16_t class concept const const_cast consteval
+        constexpr constinit continue co_await co_return co_yield decltype default delete do double dynamic_cast else
+        enum explicit export extern false float for friend goto if inline int long mutable namespace new noexcept
+        nullptr operator private protected public register reinterpret_cast requires return short signed sizeof static
         static_assert static_cast struct switch template this thread_local throw true try typedef typeid typename union
-        unsigned using virtual void volatile wchar_t while and bitand bitor compl not or xor restrict""".split()
+        unsigned using virtual void volatile wchar_t while and bitand bitor compl not or xor restrict
+    """
     compiler = require_tool("g++")
-    for word in words:
+    for word in words.split():
         source = tmp_path / "word.cpp"
         source.write_text(f"int {word} = 0;\n")
         done = subprocess.run([compiler, "-std=c++20", "-fsyntax-only", source], capture_output=True, check=False)

@@ -3,6 +3,7 @@
 import ctypes
 import errno
 import fcntl
+import hashlib
 import multiprocessing
 import os
 import signal
@@ -12,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -374,6 +376,139 @@ def test_cache_root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert cache_root() == tmp_path / "xdg" / "springline"
     monkeypatch.delenv("XDG_CACHE_HOME")
     assert cache_root() == tmp_path / "home" / ".cache" / "springline"
+
+
+# --- what is loaded is trusted and works -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cc", ['gcc "x', "gcc 'x", "gcc \\", '"'])
+def test_cc_that_is_no_command_line_is_named(cc: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", cc)
+    with pytest.raises(ToolchainError, match=r"the environment variable CC is .* no command line") as caught:
+        find_compiler()
+    assert repr(cc) in str(caught.value)
+    assert [row.ok for row in checks() if row.name == "C compiler"] == [False]
+
+
+@pytest.mark.parametrize("cc", ['""', "'' -O1", "# gcc"])
+def test_cc_that_names_no_program_is_named(cc: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", cc)
+    with pytest.raises(ToolchainError, match="no working C compiler"):
+        find_compiler()
+
+
+@pytest.mark.parametrize("content", [b"", b"no library", b"\x7fELF" + bytes(400)])
+def test_a_damaged_library_with_a_right_checksum_is_rebuilt(content: bytes) -> None:
+    library = build_library(SOURCES, main="main.c")
+    library.unlink()  # its bytes may be mapped here
+    library.write_bytes(content)
+    (library.parent / "library.sha256").write_text(hashlib.sha256(content).hexdigest())
+    assert load(build_library(SOURCES, main="main.c")).value() == 7
+
+
+CRASHING = "__attribute__((constructor)) static void crash(void) { *(volatile int *)0 = 1; }"
+
+LYING = {
+    "writes rubbish": "echo rubbish > library.so; exit 0",
+    "writes nothing": "exit 0",
+    "writes an empty file": ": > library.so; exit 0",
+    "writes what crashes": f"echo '{CRASHING}' | REAL -x c -shared -fPIC - -o library.so; exit 0",
+}
+
+
+@pytest.mark.parametrize("script", LYING.values(), ids=LYING.keys())
+def test_a_compiler_that_reports_success_wrongly_leaves_nothing_in_the_cache(
+    script: str, wrap: Callable[[str, str], Compiler], cache: Path
+) -> None:
+    script = script.replace("REAL", " ".join(find_compiler().argv))
+    liar = wrap("lying-cc", f'case "$*" in *library.so*) {script};; esac')
+    with pytest.raises(ToolchainError, match=r"lying-cc reported success, but .*set CC to another compiler"):
+        build_library(SOURCES, main="main.c", compiler=liar)
+    assert [path.name for path in cache.rglob("*") if path.is_file()] == ["lock"]
+    assert load(build_library(SOURCES, main="main.c", compiler=find_compiler())).value() == 7
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="writes into an ELF header")
+@pytest.mark.parametrize(("offset", "byte"), [(4, 1), (5, 2), (18, 0xF3)], ids=["class", "byte order", "processor"])
+def test_a_compiler_for_another_machine_is_named(
+    offset: int, byte: int, tmp_path: Path, wrap: Callable[[str, str], Compiler]
+) -> None:
+    real = " ".join(find_compiler().argv)
+    patch = f"printf '\\{byte:o}' | dd of=library.so bs=1 seek={offset} conv=notrunc status=none"
+    cross = wrap("cross-cc", f'case "$*" in *library.so*) {real} "$@" && {patch}; exit;; esac')
+    with pytest.raises(
+        ToolchainError, match=r"cross-cc makes code for another machine .*set CC to a compiler for this"
+    ):
+        build_library(SOURCES, main="main.c", compiler=cross)
+
+
+def test_a_cache_that_is_mounted_noexec_names_its_remedy(
+    wrap: Callable[[str, str], Compiler], cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Played: mounting needs more rights than a test has. A library that does not load stands for the refusal."""
+    real = os.statvfs
+
+    class Mounted(NamedTuple):
+        f_flag: int
+
+    liar = wrap("lying-cc", 'case "$*" in *library.so*) echo rubbish > library.so; exit 0;; esac')
+    monkeypatch.setattr(os, "statvfs", lambda path: Mounted(real(path).f_flag | os.ST_NOEXEC))
+    with pytest.raises(ToolchainError, match=rf"{cache}.* mounted noexec: set SPRINGLINE_CACHE"):
+        build_library(SOURCES, main="main.c", compiler=liar)
+
+
+@pytest.mark.parametrize("mode", [0o775, 0o757, 0o1777])
+@pytest.mark.parametrize("which", ["root", "entry", "library"])
+def test_a_cache_that_others_may_write_to_is_refused(mode: int, which: str, cache: Path) -> None:
+    library = build_library(SOURCES, main="main.c")
+    place = {"root": cache, "entry": library.parent, "library": library}[which]
+    place.chmod(mode)
+    with pytest.raises(ToolchainError, match=rf"{place} has mode {mode:04o}.* chmod -R go-w .*SPRINGLINE_CACHE"):
+        build_library(SOURCES, main="main.c")
+    subprocess.run(["chmod", "-R", "go-w", str(cache)], check=True)  # the remedy
+    assert load(build_library(SOURCES, main="main.c")).value() == 7
+
+
+def test_a_cache_of_another_user_is_refused_and_that_of_root_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    library = build_library(SOURCES, main="main.c")
+    owner = library.stat().st_uid
+    monkeypatch.setattr(os, "geteuid", lambda: 4711)
+    if owner:
+        with pytest.raises(ToolchainError, match=rf"belongs to user {owner}, and you are user 4711"):
+            build_library(SOURCES, main="main.c")
+    else:
+        assert build_library(SOURCES, main="main.c") == library
+        os.chown(library, 4712, -1)
+        with pytest.raises(ToolchainError, match="belongs to user 4712, and you are user 4711"):
+            build_library(SOURCES, main="main.c")
+
+
+@pytest.mark.parametrize("umask", [0o000, 0o002, 0o022, 0o077])
+def test_any_umask_makes_a_cache_that_is_trusted(
+    umask: int, counted: tuple[Compiler, Callable[[], int]], cache: Path
+) -> None:
+    compiler, builds = counted
+    before = os.umask(umask)
+    try:
+        for _ in range(2):
+            assert load(build_library(SOURCES, main="main.c", compiler=compiler)).value() == 7
+    finally:
+        os.umask(before)
+    assert builds() == 1
+    made = [cache, *(place for place in cache.rglob("*") if place.name != "lock")]
+    assert not [place for place in made if place.stat().st_mode & 0o022]
+
+
+def test_without_a_home_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", homeless)
+    for name in ("SPRINGLINE_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(ToolchainError, match=r"no home here .*set SPRINGLINE_CACHE"):
+        build_library(SOURCES, main="main.c")
+    assert [(row.name, row.ok) for row in checks()][-1] == ("cache", False)
 
 
 # --- loading ---------------------------------------------------------------------------------------------

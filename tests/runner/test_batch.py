@@ -29,16 +29,19 @@ from typer.testing import CliRunner
 
 from springline.codegen.toolchain import ToolchainError
 from springline.runner import batch, load_scenario, simulate
-from springline.runner.batch import Cluster, Threads, dataset_bytes, estimate, open_pool, run_sweep, versions
+from springline.runner.batch import Cluster, Tally, Threads, dataset_bytes, estimate, open_pool, run_sweep, versions
 from springline.runner.cli import app
-from springline.runner.commands.batch import size_text, time_text
-from springline.runner.dataset import Dataset, place, read_dataset
+from springline.runner.commands.batch import _progress, size_text, time_text
+from springline.runner.dataset import Dataset, Folder, place, read_dataset
 from springline.runner.errors import InputError
+from springline.runner.locate import packaged_sweeps
 from springline.runner.plan import Plan
 from springline.runner.quantiles import Quantiles
 from springline.runner.replay import stored_plan
+from springline.runner.simulate import trajectory_schema
+from springline.runner.storage import parquet_bytes
 from springline.runner.summary import QUANTILES, summarize
-from springline.runner.sweep import load_sweep, packaged_sweeps
+from springline.runner.sweep import load_sweep
 from springline.runner.sweep_plots import rank_correlation, summary_figures
 from springline.runner.work import parcel, perform_parcel
 
@@ -183,6 +186,26 @@ def test_kept_trajectories_are_those_of_the_runs(sweep: Path, tmp_path: Path) ->
     assert names == [f"run-{k:09d}.parquet" for k in (0, 70, 140, 210, 280)]
     scenario = stored_plan(dataset).scenario_of(140)
     assert dataset.read_part(f"trajectories/{names[2]}").equals(simulate(scenario).trajectory)
+
+
+def test_a_kept_run_that_stopped_ends_where_it_stopped(tmp_path: Path) -> None:
+    """Its trajectory has the rows that were written, not those that a complete run would have."""
+    file = tmp_path / "sweep.toml"
+    limits = "simulation.bound = 60.0\nsimulation.output_every = 3\ncontrol.k3 = 1000.0"
+    text = SWEEP.replace("samples = 300", "samples = 20").replace("duration = 0.002", f"duration = 0.02\n{limits}")
+    file.write_text(f"{text}[keep]\ntrajectories = 9\n", encoding="utf-8")
+    assert run(file, tmp_path / "data").diverged > 0
+    dataset, table = Dataset(place(tmp_path / "data")), read_dataset(tmp_path / "data")
+    plan = stored_plan(dataset)
+    stopped = 0
+    for number in (0, 9, 18):
+        kept = dataset.read_part(f"trajectories/run-{number:09d}.parquet")
+        assert kept.equals(simulate(plan.scenario_of(number)).trajectory, check_metadata=True)
+        assert not any(np.isnan(column.to_numpy()).any() for column in kept.columns)
+        assert kept["t"][-1].as_py() <= table["t_end"][number].as_py()
+        stopped += table["status"][number].as_py() == "out_of_bounds"
+        assert len(kept) < 68 or table["status"][number].as_py() == "ok"
+    assert stopped > 0
 
 
 # --- workers elsewhere -----------------------------------------------------------------------------------
@@ -402,6 +425,132 @@ def test_replay_is_bit_identical_and_notices_what_is_not(sweep: Path, tmp_path: 
     assert "iae_lift: 0x" in done.stderr
     assert command("replay", folder, 36, "-o", tmp_path / "none").exit_code == 2
     assert command("replay", tmp_path, 0, "-o", tmp_path / "none").exit_code == 2
+
+
+def test_replay_of_a_part_that_is_not_whole_says_so(sweep: Path, tmp_path: Path, command: Command) -> None:
+    folder = tmp_path / "data"
+    run(sweep, folder, chunk=64)
+    part = folder / "part-000001.parquet"
+    whole = part.read_bytes()
+    again = "springline batch --resume makes it again"
+    table = parquet.read_table(part)
+    other = table.set_column(1, table.schema.field(1), pa.array([0.5] * 64))
+    for content, code, said in (
+        (b"", 2, "is no Parquet file that can be read"),
+        (whole[:-9], 2, "is no Parquet file that can be read"),
+        ((folder / "part-000002.parquet").read_bytes(), 2, "holds other runs"),
+        (parquet_bytes(pa.table({"a": [1]})), 2, "has other columns"),
+        (parquet_bytes(table.slice(0, 63)), 2, "has 63 rows, expected 64"),
+        (parquet_bytes(other), 0, "has content that is not what was written"),
+        (whole, 0, ""),
+    ):
+        part.write_bytes(content)
+        done = command("replay", folder, 70, "-o", tmp_path / "again", "--no-plot", "--force")
+        assert done.exit_code == code, done.output
+        assert said in done.stderr
+        assert (again in done.stderr) is bool(said)
+        assert code == 0 or not (tmp_path / "again").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["batch", "paper/nominal"], "paper/nominal: is a scenario, expected a sweep: springline run paper/nominal"),
+        (["batch", "mine.toml"], "mine.toml: is a scenario, expected a sweep: springline run mine.toml"),
+        (["batch", "data"], "data: is a dataset, expected a sweep: springline replay data RUN, or springline batch"),
+        (["replay", "sweep.toml", "0"], "sweep.toml: is a sweep, expected a dataset: springline batch sweep.toml"),
+        (["replay", "gains", "0"], "gains: is a sweep, expected a dataset: springline batch gains"),
+        (["replay", "mine.toml", "0"], "is a scenario, expected a dataset: springline run mine.toml"),
+        (
+            ["replay", "one run", "0"],
+            "is a folder of a run, expected a dataset: springline run 'one run/scenario.toml'",
+        ),
+    ],
+)
+def test_what_belongs_to_another_command_is_told(
+    sweep: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch, words: list[str], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text("[control]\nk1 = 3.0\n", encoding="utf-8")
+    Path("one run").mkdir()
+    Path("one run", "scenario.toml").write_text("[control]\nk1 = 3.0\n", encoding="utf-8")
+    Path("data").mkdir()
+    Path("data", "sweep.json").write_text("{}", encoding="utf-8")
+    done = command(*words)
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert not Path("results").exists()
+
+
+def test_set_overrides_the_scenario_of_a_sweep(sweep: Path, tmp_path: Path, command: Command) -> None:
+    folder, change = tmp_path / "data", ["--set", "simulation.duration=0.001", "--set", 'control.law="power"']
+    done = command("batch", sweep, "-o", folder, "--no-plot", *change)
+    assert done.exit_code == 0, done.output
+    assert set(read_dataset(folder)["t_end"].to_pylist()) == {0.001}
+    assert stored_plan(Dataset(place(folder))).scenario_of(3).structure().law == "power"
+    refused = command("batch", sweep, "-o", folder, "--resume")
+    assert refused.exit_code == 2
+    assert "simulation.duration: 0.001 -> 0.002" in refused.stderr
+    assert command("batch", sweep, "-o", folder, "--resume", "--no-plot", *change).exit_code == 0
+    varies = command("batch", sweep, "-o", tmp_path / "other", "--set", "control.k1=3")
+    assert varies.exit_code == 2
+    assert "control.k1: it varies in this sweep (vary.control.k1): an override has no effect" in varies.stderr
+    assert not (tmp_path / "other").exists()
+
+
+def test_a_sweep_larger_than_memory_or_disk_is_refused_before_it_starts(
+    sweep: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep.write_text(SWEEP + "[keep]\ntrajectories = 10\n", encoding="utf-8")
+    plan = Plan(load_sweep(sweep))
+    columns = len(trajectory_schema(plan.groups[0].work.system))
+    need = 2 * 8 * 7 * 3 * columns  # of a chunk of 64 runs each tenth, at rows 0, 10, 20
+    batch_module = importlib.import_module("springline.runner.batch")
+    monkeypatch.setattr(batch_module, "memory", lambda: need - 1)
+    done = command("batch", sweep, "-o", tmp_path / "data", "--jobs", 1)
+    assert done.exit_code == 2
+    assert "keep.trajectories: expected more, a larger simulation.output_every" in done.stderr
+    assert (
+        f"7 trajectories of 3 rows at a time take {need:,} bytes, and there are {need - 1:,} of memory" in done.stderr
+    )
+    assert command("batch", sweep, "-o", tmp_path / "data", "--jobs", 2).exit_code == 2
+    monkeypatch.setattr(batch_module, "memory", lambda: need)
+    monkeypatch.setattr(Folder, "free", lambda self: 5000)
+    done = command("batch", sweep, "-o", tmp_path / "data", "--jobs", 1)
+    assert done.exit_code == 2
+    assert re.search(r"data: has 5,000 bytes free, and the dataset takes [\d,]{6,} at least: choose", done.stderr)
+    assert not (tmp_path / "data").exists()
+    monkeypatch.undo()
+    assert command("batch", sweep, "-o", tmp_path / "data", "--jobs", 1, "--no-plot").exit_code == 0
+
+
+def test_the_size_of_a_dataset_counts_the_trajectories_of_every_group(sweep: Path) -> None:
+    keep = "[keep]\ntrajectories = 1\n"
+    vary = "simulation.duration = {{ each = {} }}\n"
+    sizes = []
+    for durations in ("[0.1]", "[0.1, 4.0]", "[4.0, 0.1]"):
+        sweep.write_text(SWEEP + vary.format(durations) + keep, encoding="utf-8")
+        sizes.append(dataset_bytes(Plan(load_sweep(sweep))))
+    assert sizes[1] == sizes[2] > 5 * sizes[0]
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_who_sees_no_bar_gets_a_line_every_ten_seconds(
+    sweep: Path, capsys: pytest.CaptureFixture[str], *, quiet: bool
+) -> None:
+    now = [100.0]
+    plan = Plan(load_sweep(sweep))  # 300 runs of 20 steps
+    with _progress(plan, quiet=quiet, clock=lambda: now[0]) as report:
+        tally = Tally(300, found=60)
+        for second in range(1, 32):
+            now[0] = 100.0 + second
+            tally.done = 4 * second
+            report(tally, 20 * 4 * second)
+    said = capsys.readouterr()
+    assert said.out == ""
+    lines = said.err.splitlines()
+    assert [line.split(" · ")[2] for line in lines] == ["100 done", "140 done", "180 done"]
+    assert lines[0] == (f"{sweep}: 33 % of 300 runs · 4 runs/s · 100 done · 0 failed · 0 diverged · 50 s left")
 
 
 @pytest.mark.parametrize(

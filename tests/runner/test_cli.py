@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import io
 import json
+import math
 import os
 import re
 import shutil
@@ -13,6 +14,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -21,14 +23,15 @@ from typer.testing import CliRunner, Result
 
 from springline.benchmarks.contenders import CONTENDERS
 from springline.codegen.kernel import kernel
-from springline.codegen.manifest import write_tree
+from springline.codegen.manifest import Changes, write_tree
 from springline.model.sliding import LAWS
 from springline.runner import paper, terminal
 from springline.runner.claims import Check, Finding
 from springline.runner.cli import app
 from springline.runner.commands import bench
 from springline.runner.commands import run as run_command
-from springline.runner.scenario import load_scenario, packaged_scenarios
+from springline.runner.errors import InputError
+from springline.runner.scenario import load_scenario, packaged_scenarios, parse_set
 from springline.runner.simulate import simulate
 from springline.runner.storage import read_table, units
 
@@ -42,6 +45,13 @@ shake = [{ amplitude = 0.1, omega = 10.0 }]
 [simulation]
 duration = 0.5
 output_every = 100
+"""
+
+
+SWEEP = """\
+scenario = "paper/nominal"
+[vary]
+control.delta = { uniform = [0.02, 0.1] }
 """
 
 
@@ -200,7 +210,11 @@ def test_a_run_that_diverges_is_a_result() -> None:
             "override of short.toml: control.delt: unknown key, got 'delt'; ",
         ),
         (["short.toml", "--set", "control.delta"], "override of short.toml: expected --set KEY=VALUE"),
-        (["short.toml", "--set", "control.law=power"], "override of short.toml: control.law: expected a TOML value"),
+        (["short.toml", "--set", "control.law=pow er"], "override of short.toml: control.law: expected a TOML value"),
+        (["short.toml", "--set", "control.delta=0,03"], "override of short.toml: control.delta: expected a TOML value"),
+        (["short.toml", "--set", "control.law=powr"], "did you mean 'power'?"),
+        (["sweep.toml"], "sweep.toml: this is a sweep: springline batch sweep.toml"),
+        (["stability_map"], "stability_map: this is a sweep: springline batch stability_map"),
         (["short.toml", "--set", "mechanism.m3=-1.0"], "mechanism.m3: expected a number > 0 [kg]"),
         (["short.toml", "--set", "simulation.duration=0.50005"], "whole multiple"),
         (["short.toml", "--format", "xlsx"], "xlsx"),
@@ -212,8 +226,9 @@ def test_a_run_that_diverges_is_a_result() -> None:
     ],
 )
 def test_wrong_input_is_explained_and_nothing_written(elsewhere: Path, arguments: list[str], told: str) -> None:
+    (elsewhere / "sweep.toml").write_text(SWEEP, encoding="utf-8")
     assert told.lower() in refused("run", *arguments).lower()
-    assert list(contents(elsewhere)) == ["short.toml"]
+    assert set(contents(elsewhere)) == {"short.toml", "sweep.toml"}
 
 
 def test_every_mistake_of_a_file_is_told_at_once(elsewhere: Path) -> None:
@@ -264,6 +279,274 @@ def test_force_does_not_replace_a_record_that_the_run_reads() -> None:
     told = refused("run", "short.toml", "-o", "out", "--force", "--set", moving)
     assert "trajectory.csv" in told
     assert Path("out/trajectory.csv").read_text(encoding="utf-8") == record
+
+
+# --- other commands, hostile arguments -------------------------------------------------------------------
+
+EVERY = {
+    "run": ["run", "short.toml"],
+    "generate": ["generate"],
+    "export c": ["export", "c", "short.toml"],
+    "export fmu2": ["export", "fmu2", "short.toml", "--part", "loop"],
+    "export fmu3": ["export", "fmu3", "short.toml", "--part", "plant"],
+    "reproduce": ["reproduce"],
+    "bench": ["bench"],
+}
+"""Every command that writes a folder, but for batch and replay (tests/runner/test_dataset.py)."""
+
+
+@pytest.mark.parametrize("command", EVERY.values(), ids=EVERY.keys())
+def test_a_folder_that_cannot_be_is_refused_before_anything_is_done(command: list[str], elsewhere: Path) -> None:
+    (elsewhere / "a").symlink_to("b")
+    (elsewhere / "b").symlink_to("a")
+    (elsewhere / "nothing").symlink_to("nowhere")
+    before = sorted(elsewhere.iterdir())
+    for folder in ("a", "a/x", "x" * 300, "deep/" + "x" * 300, "short.toml", "short.toml/x", "nothing"):
+        assert refused(*command, "-o", folder).endswith("; choose another with -o\n")
+    for folder in ("nul\0", "nul\0/x"):
+        assert "null byte" in refused(*command, "-o", folder)
+    assert sorted(elsewhere.iterdir()) == before
+
+
+@pytest.mark.parametrize("command", EVERY.values(), ids=EVERY.keys())
+def test_a_folder_that_cannot_be_written_to_is_refused(
+    command: list[str], elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (elsewhere / "locked").mkdir(mode=0o555)
+    monkeypatch.setattr(os, "access", lambda place, _: place.stat().st_mode & 0o200 != 0)  # root may write anywhere
+    assert "locked: cannot be written to; choose another with -o" in refused(*command, "-o", "locked/out")
+
+
+@pytest.mark.parametrize("command", [EVERY[name] for name in ("generate", "export c", "export fmu2", "reproduce")])
+@pytest.mark.parametrize("file", ["trajectory.parquet", "trajectory.csv", "sweep.json", "bench.json"])
+def test_the_results_of_another_command_are_not_mixed_with(command: list[str], file: str) -> None:
+    Path("out").mkdir()
+    Path("out", file).touch()
+    assert f"out: holds the results of springline {WHOSE[file]} ({file})" in refused(*command, "-o", "out", "--force")
+    assert list(contents(Path("out"))) == [file]
+
+
+WHOSE = {"trajectory.parquet": "run", "trajectory.csv": "run", "sweep.json": "batch", "bench.json": "bench"}
+
+
+@pytest.mark.parametrize("command", ["generate", "export c", "export fmu2", "export fmu3"])
+def test_a_sweep_is_told_by_every_command_that_reads_a_scenario(command: str, elsewhere: Path) -> None:
+    (elsewhere / "my sweep.toml").write_text(SWEEP, encoding="utf-8")
+    part = ["--part", "loop"] if "fmu" in command else []
+    told = refused(*command.split(), "my sweep.toml", *part)
+    assert told == "Error: my sweep.toml: this is a sweep: springline batch 'my sweep.toml'\n"
+
+
+def test_a_folder_of_results_is_told_what_to_do_with(results: Path) -> None:
+    shutil.copytree(results, "out")
+    assert "its scenario is out/scenario.toml" in refused("run", "out")
+    Path("out/sweep.json").touch()
+    assert "this is a dataset: springline replay out RUN" in refused("generate", "out")
+
+
+@pytest.mark.parametrize("command", ["generate", "export c"])
+def test_set_changes_what_is_exported(command: str) -> None:
+    changes = ("--set", "plant.m3={ scale = 1.5 }", "--set", "control.law=double_power", "--set", "control.k2=7.5")
+    done(*command.split(), "short.toml", "-o", "c", *changes)
+    listed = json.loads(Path("c/manifest.json").read_bytes())["parameters"]
+    values = {entry["name"]: entry["value"] for entry in listed}
+    expected = load_scenario("short.toml", {"plant.m3.scale": 1.5, "control.law": "double_power", "control.k2": 7.5})
+    assert values["plant.m3"] == 1.5 * values["mechanism.m3"] == expected.value_of("plant.m3")
+    assert values["control.k2"] == 7.5
+    assert "up to date" in done(*command.split(), "short.toml", "-o", "c", *changes, "--check")
+    assert springline(*command.split(), "short.toml", "-o", "c", *changes[:-2], "--check").exit_code == 1
+
+
+@pytest.mark.parametrize("version", ["fmu2", "fmu3"])
+def test_set_changes_what_an_fmu_starts_with(version: str) -> None:
+    done("export", version, "short.toml", "--part", "controller", "-o", "fmu", "--set", "control.k1=3.25")
+    (file,) = Path("fmu").glob("*.fmu")
+    description = zipfile.ZipFile(file).read("modelDescription.xml").decode()
+    assert re.search(r'name="control\.k1"[^/]*start="3\.25"', description, re.DOTALL)
+    assert "unknown key" in refused("export", version, "short.toml", "--part", "loop", "--set", "control.q=1")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("power", "power"),
+        (" power ", "power"),
+        ('"power"', "power"),
+        ("rk4", "rk4"),
+        ("my/record-10hz.csv", "my/record-10hz.csv"),
+        ("../record.csv", "../record.csv"),
+        ("/data/record.csv", "/data/record.csv"),
+        ("größe", "größe"),
+        ("true", True),
+        ("inf", math.inf),
+        ("-inf", -math.inf),
+        ("0.5", 0.5),
+        ("1_000", 1000),
+        ("[1, 2]", [1, 2]),
+    ],
+)
+def test_a_bare_word_is_text_and_a_toml_value_is_what_it_is(text: str, value: object) -> None:
+    assert parse_set(f"control.law={text}", "x.toml") == ("control.law", value)
+
+
+@pytest.mark.parametrize("text", ["", "two words", "0,5", "03", "5e", '"open', "a\x1b", "[" * 3000, "a\nb = 1"])
+def test_what_is_neither_a_toml_value_nor_a_word_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="expected"):
+        parse_set(f"control.law={text}", "x.toml")
+
+
+# --- what reaches the terminal ---------------------------------------------------------------------------
+
+STEERING = "\x1b]0;owned\x07\x1b[31m"
+
+
+def test_no_text_of_a_user_steers_the_terminal(elsewhere: Path) -> None:
+    escaped = json.dumps(STEERING)
+    Path("bad.toml").write_text(f"[control]\n{escaped} = 1\nlaw = {escaped}\n[{escaped}]\n", encoding="utf-8")
+    Path(f"{STEERING}\x9b\u202e.toml").write_text("[control]\nq = 1\n", encoding="utf-8")
+    said = [
+        refused("run", "bad.toml"),
+        refused("run", f"{STEERING}\x9b\u202e.toml"),
+        refused("run", "short.toml", "--set", f"control.{STEERING}=1"),
+        refused("run", "short.toml", "--set", f"control.law={STEERING}"),
+        refused("run", STEERING),
+        refused("run", "short.toml", "-o", f"short.toml/{STEERING}"),
+        done("run", "short.toml", "-o", STEERING, "--no-plot"),
+        refused("list", STEERING),
+        refused(STEERING),
+    ]
+    for text in said:
+        assert r"\x1b]0;owned" in text or "short.toml: is a file" in text
+        assert not set(text) & set("\x1b\x07\x9b\u202e")
+
+
+def test_json_is_the_same_text_for_programs_and_safe_to_look_at(capsys: pytest.CaptureFixture[str]) -> None:
+    row = {"text": "δ – \x1b[31m \x7f \x9b \u202e \udcff \U000e0001", "n": [1.5, None]}
+    terminal.print_json("x", [row], {})
+    shown = capsys.readouterr().out
+    assert json.loads(shown)["rows"] == [row]
+    assert "δ –" in shown
+    assert terminal.printable(shown) == shown
+
+
+def shown_in(width: int, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> str:
+    monkeypatch.setenv("COLUMNS", str(width))
+    result = springline(*arguments)
+    assert result.exit_code == 0, result.stderr
+    return result.stdout
+
+
+TABLES = (["list", "parameters"], ["list", "scenarios"], ["list", "laws"], ["list", "mechanisms"], ["doctor"])
+
+
+@pytest.mark.parametrize("width", [40, 80, 100])
+@pytest.mark.parametrize("command", TABLES, ids=" ".join)
+def test_tables_fit_and_no_word_is_cut(command: list[str], width: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = shown_in(1000, monkeypatch, *command)
+    shown = shown_in(width, monkeypatch, *command)
+    paths = {word for word in whole.split() if "/" in word}  # they have no place to break at
+    assert max(len(line) for line in shown.splitlines() if not any(path[:20] in line for path in paths)) <= width
+    assert not [line for line in shown.splitlines() if line != line.rstrip()]
+    assert {word for word in whole.split() if "─" not in word} - paths <= set(shown.split())
+
+
+def test_a_table_of_long_words_becomes_blocks(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    terminal.print_table(
+        ["name", "where", "how much"], [["a" * 30, "b" * 28, "1.5 m"], ["c", "d", "-"]], right=["how much"]
+    )
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1:4] == [f"name       {'a' * 30}", f"where      {'b' * 28}", "how much   1.5 m"]
+
+
+def test_a_number_stays_with_its_unit(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("COLUMNS", "30")
+    terminal.print_table(["what it is", "value"], [["a long text of many words", "1.5 N m s/rad"]], right=["value"])
+    assert re.search(r" 1\.5 N m s/rad$", capsys.readouterr().out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    "command", [[], ["export"], *(name.split() for name in EVERY), ["batch"], ["replay"], ["list"]], ids=" ".join
+)
+def test_help_fits_80_columns_and_says_all(command: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = shown_in(80, monkeypatch, *command, "--help").splitlines()
+    assert max(map(len, lines)) <= 80
+    assert not [line for line in lines[1:] if line.endswith(("...", "…"))]  # the first names the arguments
+
+
+# --- the environment -------------------------------------------------------------------------------------
+
+
+def in_a_process(*arguments: str, shell: str = "", **environment: str | None) -> subprocess.CompletedProcess[str]:
+    """A command in a process of its own; `shell`: what is done with the streams; None takes a variable away."""
+    values = {name: value for name, value in (os.environ | environment).items() if value is not None}
+    program = [sys.executable, "-c", MAIN, *arguments]
+    if shell:
+        program = ["sh", "-c", f'"$@" {shell}', "sh", *program]
+    return subprocess.run(program, check=False, env=values, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"COLUMNS": "²", "LINES": "x"},
+        {"HOME": None, "TERM": None, "LANG": None},
+        {"HOME": "/nonexistent", "TMPDIR": "/nonexistent", "MPLBACKEND": "nonsense"},
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+        {"PYTHONIOENCODING": "ascii", "CC": 'gcc "x'},
+    ],
+    ids=str,
+)
+def test_a_list_needs_nothing_of_the_environment(environment: dict[str, str | None]) -> None:
+    result = in_a_process("list", "laws", **environment)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "variable_power_log" in result.stdout
+
+
+def test_names_that_the_locale_cannot_spell_are_written_and_shown(elsewhere: Path) -> None:
+    short = ("--set", "simulation.duration=0.001", "--set", "simulation.output_every=1", "--no-plot")
+    result = in_a_process(
+        "run", "short.toml", "-o", "größe", *short, LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0"
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "results: gr" in result.stdout
+    assert (elsewhere / "größe/metrics.parquet").exists()
+
+
+@pytest.mark.parametrize(
+    ("shell", "code", "said"),
+    [
+        (">&-", 0, ""),
+        ("<&- >&- 2>&-", 0, ""),
+        (">/dev/full", 1, "No space left on device"),
+    ],
+)
+@pytest.mark.parametrize(
+    "command", [["list", "laws"], ["list", "laws", "--json"], ["--help"], ["--version"]], ids=" ".join
+)
+def test_streams_that_are_closed_or_full(command: list[str], shell: str, code: int, said: str) -> None:
+    result = in_a_process(*command, shell=shell)
+    assert result.returncode == code
+    assert said in result.stderr
+    assert result.stderr.count("\n") == (1 if said else 0)
+
+
+@pytest.mark.parametrize("shell", ["2>/dev/full", "2>&-"])
+def test_wrong_input_has_its_code_though_nobody_can_be_told(shell: str) -> None:
+    assert in_a_process("run", "nowhere", shell=shell).returncode == 2
+
+
+def test_a_fault_of_springline_is_one_line_and_its_traceback_can_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: str) -> dict[str, object]:
+        raise KeyError("nobody expected this")
+
+    monkeypatch.setattr("springline.runner.commands.run.overrides", lambda *_: fail("x"))
+    told = refused("run", "short.toml", code=1)
+    assert re.fullmatch(r"Error: a fault of springline itself: KeyError: .*test_cli\.py, line \d+\).*\n", told)
+    monkeypatch.setenv("SPRINGLINE_TRACEBACK", "1")
+    assert isinstance(springline("run", "short.toml").exception, KeyError)
 
 
 # --- failures that are not the user's fault --------------------------------------------------------------
@@ -375,13 +658,26 @@ def test_check_names_what_is_stale_and_writes_nothing(generated: Path) -> None:
     before = contents(generated)
     stale = springline("generate", "paper/group2_power", "-o", generated, "--check")
     assert stale.exit_code == 1
-    assert re.search(r"changed +src/springline_model\.c: \d+ of \d+ lines", stale.stdout)
+    assert re.search(r"changed +src/springline_model\.c: \d+ of \d+ lines are new, \d+ go", stale.stdout)
     as_json = springline("generate", "paper/group2_power", "-o", generated, "--check", "--json")
     assert as_json.exit_code == 1
     answer = json.loads(as_json.stdout)
     assert answer["status"] == "stale"
     assert ("src/springline_model.c", "changed") in [(row["path"], row["kind"]) for row in answer["rows"]]
     assert contents(generated) == before
+
+
+@pytest.mark.parametrize(
+    "made",
+    [["--tunable", "control.k1,control.k2"], ["--tunable", "all"], ["--prefix", "arm"], ["--real", "float"]],
+    ids=" ".join,
+)
+def test_check_names_the_options_that_a_folder_was_made_with(made: list[str]) -> None:
+    done("generate", "-o", "c", *made)
+    stale = springline("generate", "-o", "c", "--check")
+    assert stale.exit_code == 1
+    assert stale.stdout.endswith(f"it was made with {' '.join(made)}: check it with the same\n")
+    assert "up to date" in done("generate", "-o", "c", "--check", *made)
 
 
 def test_check_of_a_folder_without_generated_files_is_one_sentence(elsewhere: Path) -> None:
@@ -461,11 +757,18 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     row = {"group": 2, "case": "power", "joint": "lift", "measure": "settling_time", "unit": "s"}
 
     def reproduce(
-        folder: Path, groups: list[int] | None = None, *, force: bool = False, progress: object = None
+        folder: Path,
+        groups: list[int] | None = None,
+        *,
+        overrides: dict[str, object] | None = None,
+        force: bool = False,
+        progress: object = None,
     ) -> paper.Reproduction:
-        seen.extend([folder, groups, force])
+        seen.extend([folder, groups, overrides, force])
         finding = Finding(3, "the new law is the fastest", (Check("yes", True),), ())
-        return paper.Reproduction(folder, (finding,), ({**row, "printed": 0.76, "value": None, "change": None},), None)
+        return paper.Reproduction(
+            folder, (finding,), ({**row, "printed": 0.76, "value": None, "change": None},), Changes((), ("a.png",))
+        )
 
     monkeypatch.setattr(paper, "reproduce", reproduce)
     return seen
@@ -476,14 +779,15 @@ def test_reproduce_shows_the_paper_beside_ours_and_verdicts(asked: list[object])
     assert re.search(r"2 power +lift +settling time +0\.76 s +–", shown)
     assert re.search(r"3 +the new law is the fastest +holds", shown)
     assert "report: report/report.html" in shown
-    assert asked == [Path("report"), [2, 4], False]
+    assert "removed: 1 files of the earlier reproduction" in shown
+    assert asked == [Path("report"), [2, 4], {}, False]
 
 
 def test_reproduce_prints_json(asked: list[object]) -> None:
-    answer = json.loads(done("reproduce", "--json", "--force"))
+    answer = json.loads(done("reproduce", "--json", "--force", "--set", "control.law=power", "--set", "plant.m3=5"))
     assert (answer["command"], answer["status"]) == ("reproduce", "ok")
     assert answer["rows"][0]["value"] is None
-    assert asked == [Path("reproduction"), None, True]
+    assert asked == [Path("reproduction"), None, {"control.law": "power", "plant.m3": 5}, True]
 
 
 def test_reproduce_refuses_wrong_input(elsewhere: Path) -> None:

@@ -5,6 +5,8 @@ import json
 import multiprocessing
 import os
 import random
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,17 +18,21 @@ from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
 from springline.codegen import lanes
 from springline.codegen.kernel_source import runtime_sources
+from springline.codegen.unfinished import TEMPORARY
 from springline.runner import storage, work
 from springline.runner.batch import open_pool, run_sweep, versions
-from springline.runner.commands.batch import batch
+from springline.runner.commands.batch import batch, replay
 from springline.runner.dataset import Dataset, changes, place, read_dataset
 from springline.runner.errors import InputError
 from springline.runner.plan import Plan
-from springline.runner.storage import TEMPORARY
+from springline.runner.replay import stored_plan
+from springline.runner.scenario import load_scenario
 from springline.runner.sweep import load_sweep
 
 SWEEP = """
@@ -82,6 +88,248 @@ def test_resume_does_exactly_what_is_missing(write: Callable[..., Path], tmp_pat
     assert content(folder) == whole
     assert (folder / "part-000004.parquet").stat().st_mtime_ns == untouched
     assert run(write(), folder, resume=True).done == 0
+
+
+def damage(folder: Path, how: str) -> str:
+    """Do something to parts of a dataset; which ones are not whole then."""
+    first, second = folder / "part-000002.parquet", folder / "part-000003.parquet"
+    content = bytearray(first.read_bytes())
+    match how:
+        case "copied":
+            second.write_bytes(content)
+            return "part-000003.parquet holds other runs"
+        case "flipped":
+            for place_of in range(200, 260):
+                content[place_of] ^= 0x55
+            first.write_bytes(content)
+            return "part-000002.parquet"
+        case "foreign":
+            parquet.write_table(pa.table({"run": list(range(64, 96))}), first)
+            return "part-000002.parquet has other columns"
+        case "edited":
+            table = parquet.read_table(first)
+            row = table.column_names.index("iae_lift")
+            values = [1.0, *table["iae_lift"].to_pylist()[1:]]
+            parquet.write_table(table.set_column(row, table.schema.field(row), pa.array(values)), first)
+            return "part-000002.parquet has content that is not what was written"
+        case "of another sweep":
+            first.write_bytes((folder.parent / "other" / first.name).read_bytes())
+            return "part-000002.parquet is of another sweep"
+        case "cut":
+            first.write_bytes(content[: len(content) // 2])
+            return "part-000002.parquet is no Parquet file"
+        case "empty":
+            first.write_bytes(b"")
+            return "part-000002.parquet is no Parquet file"
+    raise AssertionError(how)
+
+
+@pytest.mark.parametrize("how", ["copied", "flipped", "foreign", "edited", "of another sweep", "cut", "empty"])
+def test_a_part_that_is_not_whole_is_named_and_made_again(
+    write: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], how: str
+) -> None:
+    folder = tmp_path / "data"
+    run(write(change=("seed = 2", "seed = 3")), tmp_path / "other")
+    run(write(), folder)
+    whole = content(folder)
+    flaw = damage(folder, how)
+    batch(str(write()), output=str(folder), resume=True, plot=False)
+    said = capsys.readouterr().err
+    assert flaw in said
+    assert said.count("its runs are simulated again") == 1
+    assert content(folder) == whole
+
+
+def test_a_part_whose_content_is_whole_is_written_anew_without_a_simulation(
+    write: Callable[..., Path], tmp_path: Path
+) -> None:
+    """As another version of the library would have written it; no reader may find statistics that are wrong."""
+    folder = tmp_path / "data"
+    run(write(), folder)
+    whole = content(folder)
+    part = folder / "part-000002.parquet"
+    parquet.write_table(parquet.read_table(part), part, compression="none")
+    assert run(write(), folder, resume=True).done == 0
+    assert content(folder) == whole
+
+
+def test_kept_trajectories_are_checked_and_made_again_too(write: Callable[..., Path], tmp_path: Path) -> None:
+    sweep, folder = write(change=("[set]", "[keep]\ntrajectories = 100\n[set]")), tmp_path / "data"
+    run(sweep, folder)
+    names = sorted((folder / "trajectories").iterdir())
+    whole = [name.read_bytes() for name in names]
+    names[0].unlink()
+    names[1].write_bytes(whole[2])
+    names[2].write_bytes(whole[2][:-50])
+    said: list[str] = []
+    plan, dataset = Plan(load_sweep(sweep)), Dataset(place(folder))
+    done = dataset.done(plan, said.append)
+    assert sorted(set(range(10)) - done) == [0, 3, 6]
+    assert [line.partition(" that")[0] for line in said] == [
+        "trajectories/run-000000000.parquet is missing: its runs are simulated again",
+        "trajectories/run-000000100.parquet holds other runs: its runs are simulated again",
+        "trajectories/run-000000200.parquet is no Parquet file",
+    ]
+    assert run(sweep, folder, resume=True).done == 96
+    assert [name.read_bytes() for name in names] == whole
+
+
+@pytest.mark.parametrize("name", ["part-000004.parquet", "trajectories/run-000000128.parquet"])
+def test_a_folder_in_the_place_of_a_file_is_the_users_to_move(
+    write: Callable[..., Path], tmp_path: Path, name: str
+) -> None:
+    sweep, folder = write(change=("[set]", "[keep]\ntrajectories = 128\n[set]")), tmp_path / "data"
+    run(sweep, folder)
+    (folder / name).unlink()
+    (folder / name).mkdir()
+    with pytest.raises(InputError, match=f"{name}: is a folder where a file of the dataset belongs"):
+        batch(str(sweep), output=str(folder), resume=True)
+
+
+def test_each_part_is_read_once_for_check_and_end(
+    write: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "data"
+    run(write(), folder)
+    (folder / "part-000001.parquet").unlink()
+    opened: list[int] = []
+    genuine = Dataset.read_sealed
+
+    def counted(self: Dataset, plan: Plan, chunk: Any) -> Any:
+        opened.append(chunk.number)
+        return genuine(self, plan, chunk)
+
+    monkeypatch.setattr(Dataset, "read_sealed", counted)
+    batch(str(write()), output=str(folder), resume=True, plot=False)
+    assert opened == [0, *range(2, 10)]
+
+
+def test_datasets_of_earlier_versions_are_refused_by_resume_and_replay_but_read(
+    write: Callable[..., Path], tmp_path: Path
+) -> None:
+    folder = tmp_path / "data"
+    run(write(), folder)
+    file = folder / "sweep.json"
+    stored = json.loads(file.read_text(encoding="utf-8"))
+    file.write_text(json.dumps({k: v for k, v in stored.items() if k not in ("format", "sampler")}), encoding="utf-8")
+    for refused in (lambda: run(write(), folder, resume=True), lambda: stored_plan(Dataset(place(folder)))):
+        with pytest.raises(InputError, match=r"was begun by an earlier version of springline.*begin a new one"):
+            refused()
+    assert len(read_dataset(folder)) == 300
+
+
+def test_resume_refuses_another_sampler(
+    write: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(write(), tmp_path / "data")
+    monkeypatch.setattr("springline.runner.sampling.VERSION", 2)
+    with pytest.raises(InputError, match="\n  sampler: 1 -> 2"):
+        run(write(), tmp_path / "data", resume=True)
+    with pytest.raises(InputError, match="drawn by another version of the sampler: expected 2, got 1"):
+        stored_plan(Dataset(place(tmp_path / "data")))
+
+
+def test_reading_tells_what_is_not_there(write: Callable[..., Path], tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    dataset = Dataset(place(folder))
+    dataset.begin(Plan(load_sweep(write())), versions(), resume=False)
+    with pytest.raises(InputError, match="holds no runs yet"):
+        read_dataset(folder)
+    run(write(), folder, resume=True)
+    with pytest.raises(InputError, match=r"unknown column, got 'iae_lft'; did you mean 'iae_lift'"):
+        read_dataset(folder, ["iae_lft"])
+    damage(folder, "foreign")
+    with pytest.raises(InputError, match=r"part-000002\.parquet: has other columns than the first part"):
+        read_dataset(folder)
+    damage(folder, "empty")
+    with pytest.raises(InputError, match=r"part-000002\.parquet: is damaged"):
+        read_dataset(folder)
+
+
+# --- the signal tables -----------------------------------------------------------------------------------
+
+RECORD = "t,heave\n" + "\n".join(f"{k / 10},{0.1 * (k % 7) * (k > 2)}" for k in range(12)) + "\n"
+MOVED = """
+[base_motion]
+kind = "table"
+path = "records/{record}"
+columns = {{ t = "t", shake = "heave" }}
+"""
+
+
+@pytest.fixture
+def at_sea(tmp_path: Path) -> Path:
+    """A sweep with a scenario and two records in folders of their own."""
+    home = tmp_path / "home"
+    (home / "records").mkdir(parents=True)
+    (home / "records" / "calm.csv").write_text(RECORD, encoding="utf-8")
+    (home / "records" / "rough.csv").write_text(RECORD.replace(",0.", ",1."), encoding="utf-8")
+    (home / "ship.toml").write_text(MOVED.format(record="calm.csv"), encoding="utf-8")
+    sweep = SWEEP.format(samples=40, chunk=32).replace("paper/nominal", "ship.toml")
+    (home / "sweep.toml").write_text(sweep, encoding="utf-8")
+    return home
+
+
+def test_a_resume_over_a_changed_table_is_refused(at_sea: Path, tmp_path: Path) -> None:
+    run(at_sea / "sweep.toml", tmp_path / "data")
+    record = at_sea / "records" / "calm.csv"
+    record.write_text(RECORD.replace(",0.4", ",0.5"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"\n  tables\.base_motion\.csv\.sha256: .* -> "):
+        run(at_sea / "sweep.toml", tmp_path / "data", resume=True)
+    record.write_text(RECORD, encoding="utf-8")
+    assert run(at_sea / "sweep.toml", tmp_path / "data", resume=True).done == 0
+
+
+def test_a_sweep_that_moved_with_its_table_resumes_and_its_dataset_replays_without(
+    at_sea: Path, tmp_path: Path
+) -> None:
+    run(at_sea / "sweep.toml", tmp_path / "data")
+    whole = content(tmp_path / "data")
+    assert str(tmp_path) not in whole["sweep.json"].decode()
+    (tmp_path / "data" / "part-000001.parquet").unlink()
+    moved = at_sea.rename(tmp_path / "elsewhere")
+    assert run(moved / "sweep.toml", tmp_path / "data", resume=True).done == 8
+    assert content(tmp_path / "data") == whole
+    expected = load_sweep(moved / "sweep.toml").scenario.signal_tables
+    shutil.rmtree(moved)
+    data = (tmp_path / "data").rename(tmp_path / "archive")
+    plan = stored_plan(Dataset(place(data)))
+    assert plan.scenario_of(39).signal_tables == expected
+    replay(str(data), 39, output=tmp_path / "again", plot=False)
+    (data / "tables" / "base_motion.csv").write_text(RECORD.replace(",0.4", ",0.5"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"tables/base_motion\.csv: is not what the runs have read"):
+        stored_plan(Dataset(place(data)))
+    # What was replayed is complete by itself, and has no path of this machine.
+    assert str(tmp_path) not in (tmp_path / "again" / "scenario.toml").read_text(encoding="utf-8")
+    shutil.rmtree(data)
+    assert load_scenario(tmp_path / "again" / "scenario.toml").signal_tables == expected
+
+
+def test_tables_that_vary_are_kept_and_told_apart_by_content(at_sea: Path, tmp_path: Path) -> None:
+    sweep, data = at_sea / "sweep.toml", tmp_path / "data"
+    records = '\nbase_motion.path = { each = ["records/calm.csv", "records/rough.csv"] }\n'
+    sweep.write_text(sweep.read_text(encoding="utf-8") + records, encoding="utf-8")
+    run(sweep, data)
+    assert sorted(file.name for file in (data / "tables").iterdir()) == ["base_motion-2.csv", "base_motion.csv"]
+    rough = at_sea / "records" / "rough.csv"
+    before = rough.read_text(encoding="utf-8")
+    rough.write_text(before.replace("1.4", "1.5"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"tables\.base_motion-2\.csv\.sha256"):
+        run(sweep, data, resume=True)
+    rough.write_text(before, encoding="utf-8")
+    expected = [Plan(load_sweep(sweep)).scenario_of(number).signal_tables for number in (0, 79)]
+    shutil.rmtree(at_sea)
+    plan = stored_plan(Dataset(place(data)))
+    assert [plan.scenario_of(number).signal_tables for number in (0, 79)] == expected
+    assert Dataset(place(data)).done(plan) == {0, 1, 2, 3}
+
+
+def test_a_dataset_behind_a_url_keeps_its_tables(at_sea: Path, memory: str) -> None:
+    run(at_sea / "sweep.toml", memory)
+    expected = load_sweep(at_sea / "sweep.toml").scenario.signal_tables
+    shutil.rmtree(at_sea)
+    dataset = Dataset(place(memory))
+    assert stored_plan(dataset).scenario_of(3).signal_tables == expected
 
 
 def test_resume_of_nothing_begins(write: Callable[..., Path], tmp_path: Path) -> None:
@@ -203,6 +451,34 @@ def test_a_damaged_description_is_told(write: Callable[..., Path], tmp_path: Pat
         (folder / "sweep.json").write_text(json.dumps(damaged), encoding="utf-8")
         with pytest.raises(InputError, match=r"sweep\.json: is damaged"):
             run(write(), folder, resume=True)
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 100_000, "[]", "9" * 6000, "{", "nonsense", ""])
+def test_a_description_that_is_none_is_told(write: Callable[..., Path], tmp_path: Path, text: str) -> None:
+    folder = tmp_path / "data"
+    run(write(32), folder)
+    (folder / "sweep.json").write_text(text, encoding="utf-8")
+    for command in (lambda: run(write(32), folder, resume=True), lambda: stored_plan(Dataset(place(folder)))):
+        with pytest.raises(InputError, match=r"sweep\.json: is damaged"):
+            command()
+
+
+@pytest.mark.parametrize("key", ["chunk", "runs", "chunks", "groups", "tables", "sweep", "scenario", "sampler"])
+def test_no_entry_of_a_description_can_be_missing_or_another(
+    write: Callable[..., Path], tmp_path: Path, key: str
+) -> None:
+    folder = tmp_path / "data"
+    run(write(32), folder)
+    stored = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    others = [{k: v for k, v in stored.items() if k != key}]
+    others += [stored | {key: value} for value in (None, 0, -1, True, 1.5, "x", [], {"a": {}}, [[]], 10**30)]
+    for other in others:
+        (folder / "sweep.json").write_text(json.dumps(other), encoding="utf-8")
+        for command in (lambda: run(write(32), folder, resume=True), lambda: stored_plan(Dataset(place(folder)))):
+            with pytest.raises(
+                InputError, match=r"is damaged|cannot be resumed|sampler|chunk: expected|numbers of runs"
+            ):
+                command()
 
 
 def test_changes_are_told_by_place() -> None:
@@ -366,12 +642,17 @@ SMALL_DISK = """
 import subprocess, sys
 from typer.testing import CliRunner
 from springline.runner.cli import app
+from springline.runner.dataset import Folder
 sweep, disk = sys.argv[1:]
 def call(*more):
     done = CliRunner().invoke(app, ["batch", sweep, "-o", disk + "/data", "--no-plot", *more])
     print(done.exit_code, done.stderr.replace(chr(10), " "))
-subprocess.run(["mount", "-t", "tmpfs", "-o", "size=120k", "tmpfs", disk], check=True)
+subprocess.run(["mount", "-t", "tmpfs", "-o", "size=40k", "tmpfs", disk], check=True)
 call()
+subprocess.run(["mount", "-o", "remount,size=120k", disk], check=True)
+known, Folder.free = Folder.free, lambda self: None
+call()
+Folder.free = known
 subprocess.run(["mount", "-o", "remount,size=20m", disk], check=True)
 call("--resume")
 subprocess.run(["cp", "-r", disk + "/data", disk + "-copy"], check=True)
@@ -389,7 +670,8 @@ def test_a_tmpfs_that_is_full(write: Callable[..., Path], tmp_path: Path, requir
     script = [*namespace, sys.executable, "-c", SMALL_DISK, sweep, disk]
     done = subprocess.run(script, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    first, second = done.stdout.splitlines()
+    refused, first, second = done.stdout.splitlines()
+    assert re.match(r"2 Error: .*has [\d,]+ bytes free, and the dataset takes [\d,]+ at least: choose another", refused)
     assert first.startswith("1 ")
     assert "No space left on device" in first
     assert "--resume" in first

@@ -56,6 +56,13 @@ def test_same_export_changes_nothing(folder: Path) -> None:
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
+@pytest.mark.parametrize("name", ["loop", "Stepping", "fmu_model", "math", "float"])
+def test_a_model_identifier_that_takes_a_file_or_a_name_is_refused(name: str, tmp_path: Path) -> None:
+    message = refused("export", "fmu2", "paper/nominal", "--part", "loop", "--name", name, "-o", tmp_path / "fmu")
+    assert "choose another" in message
+    assert not (tmp_path / "fmu").exists()
+
+
 def test_scenario_file_name_and_tunable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     binary = tmp_path / "library.so"
     binary.write_bytes(b"not built: only the description is looked at")

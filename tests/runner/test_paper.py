@@ -22,6 +22,8 @@ import numpy as np
 import pytest
 
 from springline.codegen.manifest import FolderConflict
+from springline.runner import paper
+from springline.runner.errors import InputError
 from springline.runner.measured import Measured
 from springline.runner.paper import Reproduction, reproduce
 from springline.runner.paper_cases import CASES, GROUPS, JOINTS, MEASURES, cases
@@ -284,6 +286,58 @@ def test_an_edited_report_is_replaced_only_when_asked(done: Reproduction, tmp_pa
     assert (folder / "report.md").read_text() == "my notes"
     reproduce(folder, [4], force=True)
     assert contents(folder) == contents(done.folder)
+
+
+@pytest.mark.parametrize(
+    ("there", "told"),
+    [
+        ({"groups": [1, 2, 3, 4], "whole": True}, "of the whole paper, and a group alone is less"),
+        ({"groups": [3, 4]}, "has group 3 too"),
+        ({"groups": [1, 2, 4]}, "has group 1, 2 too"),
+        ({"groups": [4], "set": {"control.delta": 0.06}}, "other values of --set"),
+    ],
+)
+def test_a_report_that_would_lose_something_is_kept(
+    there: dict[str, object], told: str, done: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def computed(*_: object, **__: object) -> None:
+        raise AssertionError("it is known before anything is computed")
+
+    shutil.copytree(done.folder, tmp_path / "out")
+    manifest = json.loads((tmp_path / "out/manifest.json").read_bytes())
+    (tmp_path / "out/manifest.json").write_text(json.dumps(manifest | there))
+    before = contents(tmp_path)
+    monkeypatch.setattr(paper, "study", computed)
+    with pytest.raises(FolderConflict, match=rf"{told}(.|\n)*--force"):
+        reproduce(tmp_path / "out", [4])
+    with pytest.raises(AssertionError, match="before anything"):
+        reproduce(tmp_path / "out", [4], force=True)
+    assert contents(tmp_path) == before
+
+
+def test_a_folder_with_other_things_in_it_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(FolderConflict, match=r"notes\.txt: not written by this command(.|\n)*--force"):
+        reproduce(tmp_path, [4])
+    assert list(contents(tmp_path)) == ["notes.txt"]
+
+
+def test_overrides_change_every_run_and_the_report_says_so(tmp_path: Path) -> None:
+    changes = {"control.delta": 0.06, "simulation.duration": 0.3}
+    made = reproduce(tmp_path / "out", [4], overrides=changes)
+    for case in cases([4]):
+        metrics = simulate(load_scenario(case.scenario, changes)).metrics.to_pylist()[0]
+        shown = {(row["joint"], row["measure"]): row["value"] for row in made.table if row["case"] == case.name}
+        assert shown == {(joint, measure): metrics[f"{measure}_{joint}"] for joint, measure in shown}
+    assert "`control.delta = 0.06`, `simulation.duration = 0.3`" in (tmp_path / "out/report.md").read_text()
+    assert json.loads((tmp_path / "out/manifest.json").read_bytes())["set"] == changes
+
+
+def test_overrides_that_cannot_be_are_refused_before_anything_is_written(tmp_path: Path) -> None:
+    for changes in ({"control.delt": 1.0}, {"control.delta": -1.0}):
+        with pytest.raises(InputError, match=r"override of paper/group4_fast_on: control\.delt"):
+            reproduce(tmp_path / "out", [4], overrides=changes)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_of_another_command_is_left_alone(tmp_path: Path) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
+import signal
 import stat
 from pathlib import Path
 
@@ -144,3 +146,24 @@ def test_write_folder_that_fails_leaves_an_old_folder_as_it_was(
         write_folder(tmp_path, {"a.txt": b"new", "b.txt": b"new"}, replaces=["*.txt"])
     assert names(tmp_path) == ["a.txt", "b.txt"]
     assert (tmp_path / "a.txt").read_bytes() == b"old"
+
+
+def killed_while_renaming(folder: Path) -> None:
+    def die(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    os.rename = os.replace = die  # type: ignore[assignment]  # this process is ours alone
+    write_folder(folder, {"a.txt": b"half"})
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_the_next_write_folder_removes_what_a_killed_one_left(fresh: bool, tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    if not fresh:
+        folder.mkdir()
+    process = multiprocessing.get_context("fork").Process(target=killed_while_renaming, args=(folder,))
+    process.start()
+    process.join()
+    assert list(tmp_path.rglob(".springline-*")), "killed too early for this test to mean anything"
+    write_folder(folder, {"a.txt": b"whole"})
+    assert [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")] == ["results", "results/a.txt"]

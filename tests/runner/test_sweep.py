@@ -11,8 +11,9 @@ from scipy import special, stats
 
 from springline.runner import sampling
 from springline.runner.errors import InputError
+from springline.runner.locate import packaged_sweeps
 from springline.runner.plan import MOST_GROUPS, Plan
-from springline.runner.sweep import axis_from_json, load_sweep, packaged_sweeps
+from springline.runner.sweep import load_sweep, sweep_from_json
 
 Write = Callable[..., Path]
 
@@ -80,6 +81,47 @@ def test_sobol_is_a_net_and_starts_anywhere() -> None:
     sequence = sampling.Sobol(7, ("a", "b"))
     for first in (900, 0, 17, 400):
         assert np.array_equal(sequence.rows(first, 100), points[first : first + 100])
+
+
+def test_the_sampler_draws_what_its_version_says() -> None:
+    """From Philox4x64-10, SplitMix64 in a Feistel network, and Joe and Kuo's numbers, each in plain integers.
+
+    A release in which one of these differs has another sampling.VERSION: it must not continue a dataset of this one.
+    """
+    assert sampling.VERSION == 1
+    random = {0: "0x1.bcb24808a7b46p-2", 1: "0x1.a1e7edc47030ap-2", 4: "0x1.af4a4da54af1ap-2"}
+    random[1_000_003] = "0x1.6491d0b80938dp-1"
+    assert {i: float(sampling.random(11, "control.k1", i, 1)[0]).hex() for i in random} == random
+    key = sampling._key(5, "a")
+    assert sampling._permuted(np.arange(10, dtype=np.uint64), 10, key).tolist() == [6, 9, 8, 1, 2, 7, 5, 4, 0, 3]
+    some = np.array([0, 1, 999_999], dtype=np.uint64)
+    assert sampling._permuted(some, 1_000_003, key).tolist() == [77_048, 736_779, 924_334]
+    column = [float(x).hex() for x in sampling.latin_hypercube(5, "a", 0, 3, 10)]
+    assert column == ["0x1.41a5b5eaf5320p-1", "0x1.d0b0ef085f153p-1", "0x1.a94338b654d1dp-1"]
+    points = {
+        0: ["0x1.702d675600000p-2", "0x1.23b8575700000p-1"],
+        1: ["0x1.b816b3ab00000p-1", "0x1.1dc2bab800000p-4"],
+        77: ["0x1.1416b3ab00000p-1", "0x1.1f70aeae00000p-2"],
+        123_456: ["0x1.6b0f675600000p-2", "0x1.7e29575700000p-1"],
+    }
+    sequence = sampling.Sobol(3, ("control.k1", "control.delta"))
+    assert {i: [float(x).hex() for x in sequence.rows(i, 1)[0]] for i in points} == points
+    spreads = {
+        sampling.uniform: (-1.5, 4.0, "-0x1.7fffffffffffdp+0 0x1.3333333333330p-3 0x1.eae147ae147aep+1"),
+        sampling.log_uniform: (0.02, 0.1, "0x1.47ae147ae147cp-6 0x1.098743b3bd2a7p-5 0x1.864b0717e0638p-4"),
+        sampling.normal: (1.0, 0.05, "0x1.2dd5fbdf5aaf2p-1 0x1.f29349eeca94dp-1 0x1.1812fc07e0743p+0"),
+    }
+    for spread, (first, second, numbers) in spreads.items():
+        drawn = spread(np.array([2.0**-53, 0.3, 0.97]), first, second)
+        assert " ".join(float(x).hex() for x in drawn) == numbers
+
+
+@pytest.mark.parametrize(("low", "high"), [(98.08, 99.72), (41.4, 61.42), (27.72, 29.41)])
+def test_rounding_leads_no_number_out_of_a_logarithmic_range(low: float, high: float) -> None:
+    """Ranges at whose end low exp(u ln(high/low)) rounds to more than high."""
+    last = np.array([1 - 2.0**-53])
+    assert low * np.exp(last * np.log(high / low)) >= high
+    assert sampling.log_uniform(last, low, high)[0] == high
 
 
 def test_distributions_are_the_textbook_ones() -> None:
@@ -221,7 +263,7 @@ def test_chunks_are_whole_packs_and_small_enough(write: Write) -> None:
 
 def test_axes_survive_their_description(write: Write) -> None:
     sweep = load_sweep(write(VARIED + "control.U_max = { values = [inf, 100.0] }\n"))
-    assert tuple(axis_from_json(entry) for entry in sweep.as_json()["vary"]) == sweep.axes
+    assert sweep_from_json(sweep.as_json(), sweep.chunk or 32, sweep.scenario, sweep.source).axes == sweep.axes
 
 
 def test_nested_tables_and_quoted_keys_mean_the_same(tmp_path: Path) -> None:
@@ -308,6 +350,94 @@ def test_the_packaged_sweeps_are_those_of_the_documentation() -> None:
     ],
 )  # fmt: skip
 def test_mistakes_are_named(write: Write, vary: str, head: str, message: str) -> None:
+    with pytest.raises(InputError, match=f"(?s){message}"):
+        plan_of(write(vary, head))
+
+
+def test_keys_without_numbers_of_their_own_may_be_tied(write: Write) -> None:
+    vary = "control.l = { each = [3, 5] }\ncontrol.r = { tie = 'control.l' }\ncontrol.k1 = { uniform = [1, 2] }"
+    assert [group.constants["control.r"] for group in plan_of(write(vary)).groups] == [3, 5]
+
+
+def test_sweeps_that_no_folder_or_counter_holds_are_refused(write: Write) -> None:
+    vary = "control.k1 = { uniform = [1, 2] }"
+    with pytest.raises(InputError, match=r"chunk: expected at least 1001: 1,000,000,000 parts .*1,000,000, got 1$"):
+        plan_of(write(vary, "samples = 1000000000\nchunk = 1"))
+    assert plan_of(write(vary, "samples = 1000000000\nchunk = 1001")).chunks == 999_001
+    long = "\n[set]\nsimulation.duration = 1e11\nsimulation.step = 1e-2"
+    with pytest.raises(InputError, match=r"samples: expected fewer .* 10,000,000,000,000,000,000,000 steps are more"):
+        plan_of(write(vary, f"samples = 1000000000\nchunk = 65536{long}"))
+    assert plan_of(write(vary, f"samples = 900000{long}")).chunks
+
+
+def test_a_long_sweep_gets_chunks_that_a_folder_has_room_for(write: Write) -> None:
+    head = "samples = 1000000000\n[set]\nsimulation.duration = 4000.0"
+    assert 900_000 < plan_of(write("control.k1 = { uniform = [1, 2] }", head)).chunks <= 1_000_000
+
+
+def test_overrides_take_the_place_of_the_sweeps_own(write: Write) -> None:
+    file = write("control.k1 = { uniform = [1, 2] }", "samples = 9\n[set]\nsimulation.duration = 2.0")
+    sweep = load_sweep(file, {"simulation.duration": 1.0, "control.delta": 0.03})
+    assert sweep.scenario.value_of("simulation.duration") == 1.0
+    assert sweep.scenario.value_of("control.delta") == 0.03
+    assert load_sweep(file).scenario.value_of("simulation.duration") == 2.0
+    with pytest.raises(InputError, match=r"override of paper/nominal: control\.delt"):
+        load_sweep(file, {"control.delt": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("vary", "key", "refused"),
+    [
+        ("control.a_max", "control.a_max", True),
+        ("control.a_max", "control.a_max.1", True),
+        ("control.a_max.0", "control.a_max", False),
+        ("control.a_max.0", "control.a_max.1", False),
+        ("plant.m3.scale", "plant.m3", True),
+        ("plant.m3", "plant.m3.scale", True),
+        ("plant.m3", "mechanism.m3", False),
+        ("control.k1", "control.k2", False),
+    ],
+)
+def test_an_override_of_what_varies_is_refused(write: Write, vary: str, key: str, *, refused: bool) -> None:
+    file = write(f"{vary} = {{ uniform = [20, 30] }}")
+    if not refused:
+        load_sweep(file, {key: 25.0})
+        return
+    with pytest.raises(InputError, match=rf"{key}: it varies in this sweep \(vary\.{vary}\)"):
+        load_sweep(file, {key: 25.0})
+
+
+MANY, ENDLESS, HEX = "9" * 400, "9" * 6000, "0x" + "f" * 6000
+UNLIKELY = [
+    (f"control.k1 = {{ values = [1, {MANY}] }}", "samples = 9", r"vary\.control\.k1: expected a number > 0"),
+    ("control.k1 = { each = [1, 9007199254740993] }", "samples = 9", "no 64-bit float is 9007199254740993"),
+    (f"control.k1 = {{ uniform = [1, {MANY}] }}", "samples = 9", "two finite numbers"),
+    (f"control.k1 = {{ uniform = [1, 2], points = {MANY} }}", "method = 'grid'", r"1\.00e\+400 runs"),
+    ("control.k1 = { uniform = [1, 2] }", f"samples = {ENDLESS}", "no valid TOML: an integer has thousands of"),
+    ("control.k1 = { uniform = [1, 2] }", f"samples = {HEX}", r"samples: expected a whole.*got 0xfff"),
+    (f"control.k1 = {{ tie = 'control.k2', factor = {MANY} }}", "samples = 9", "other than 0"),
+    (f"simulation.output_every = {{ each = [{HEX}, 'a'] }}", "samples = 9", r"vary\.simulation\.output_every"),
+    ("[" * 3000, "samples = 9", "is no valid TOML"),
+    ("control.k1 = " + "[" * 3000 + "]" * 3000, "samples = 9", "no valid TOML: tables and lists"),
+    ("control.k1 = " + "[" * 300 + "]" * 300, "samples = 9", "no valid TOML: tables and lists"),
+    ("a." * 5000 + "b.uniform = [1, 2]", "samples = 9", "no valid TOML: tables and lists"),
+    ("control.k1 = { uniform = [1, 2] }", f"samples = 9\n[set]\n{'a.' * 20}b = 1", "set: .*at most 16 parts"),
+    *(
+        (f"simulation.duration = {{ each = {values} }}\n{tied}", "samples = 9", r"vary\.")
+        for values in ('[0.001, "a"]', "[0.001, true]", "[0.001, [1]]", "[1, { a = 1 }]", "[1, 1979-05-27]")
+        for tied in (
+            "",
+            "control.k1 = { tie = 'simulation.duration', factor = 3 }",
+            "control.k1 = { tie = 'simulation.duration' }",
+            "simulation.output_every = { tie = 'simulation.duration', values = [1, 2] }",
+            "simulation.bound = { tie = 'simulation.duration' }",
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize(("vary", "head", "message"), UNLIKELY, ids=range(len(UNLIKELY)))
+def test_what_nobody_would_write_is_named_too(write: Write, vary: str, head: str, message: str) -> None:
     with pytest.raises(InputError, match=f"(?s){message}"):
         plan_of(write(vary, head))
 

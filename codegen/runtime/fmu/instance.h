@@ -227,6 +227,8 @@ static int fmu_set(fmu_instance *fmu, const char *function, const unsigned refer
 
 /* ---- steps ------------------------------------------------------------------------------------------------- */
 
+enum { FMU_MOST_STEPS = 1000000000 }; /* in one communication step: minutes to hours of computing */
+
 static int fmu_do_step(fmu_instance *fmu, const char *function, double from, double length) {
   fmu_state *now = &fmu->core.now;
   const double until = from + length, unit = fmu_unit(length);
@@ -245,10 +247,11 @@ static int fmu_do_step(fmu_instance *fmu, const char *function, double from, dou
   if (sl_fabs(from - now->clock) > fmu_tolerance(from, unit)) {
     return fmu_refuse(fmu, "%s: a step from %.17g s, but the instance is at %.17g s", function, from, now->clock);
   }
-  if (FMU_GRID > 0.0 && length / FMU_GRID > 1e9) {
-    return fmu_refuse(fmu, "%s: a step of %g s is more than 1e9 steps of %g s", function, length, FMU_GRID);
-  }
   place = fmu_destination(now, length, until);
+  if (place.step - now->step > FMU_MOST_STEPS) {
+    return fmu_refuse(fmu, "%s: a step of %g s is more than %d steps of %g s", function, length, (int)FMU_MOST_STEPS,
+                      FMU_GRID);
+  }
   if (place.time > FMU_UNTIL + fmu_tolerance(until, unit)) {
     return fmu_refuse(fmu, "%s: a step to %.17g s after the start, but the scenario's tables end at %.17g s", function,
                       place.time, FMU_UNTIL);

@@ -1,0 +1,237 @@
+"""Every command and snippet that the documentation shows is run, as it stands there, in the order of the page.
+
+Simulations are made short behind the text's back. What cannot be run here is listed with the reason in ELSEWHERE.
+Commands within the text are checked against the options that the command line has.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from springline.codegen.toolchain import find_compiler
+from springline.runner import plots
+from springline.runner import scenario as scenarios
+from springline.runner import sweep as sweeps
+from springline.runner.cli import app
+from springline.runner.locate import kind_of
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "examples/README.md"]
+PROGRAMS = ("springline", "make", "pip", "python", "fmpy")
+STEPS = 100  # of every documented run
+
+ELSEWHERE = {
+    "make reproduce": "minutes; tests/runner/test_paper.py reproduces a group",
+    "make test": "this very test among them",
+}
+"""Commands that are not run here, and why not."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A piece of code in a page; line counts from 1."""
+
+    page: Path
+    line: int
+    language: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.page.relative_to(ROOT)}:{self.line}"
+
+
+def blocks(page: Path) -> Iterator[Block]:
+    """Fenced blocks, and indented ones that begin with a command."""
+    lines = page.read_text(encoding="utf-8").splitlines()
+    k = 0
+    while k < len(lines):
+        fence = re.fullmatch(r"```(\w*)", lines[k])
+        indented = re.match(rf"    ({'|'.join(PROGRAMS)}) ", lines[k])
+        if fence:
+            end = lines.index("```", k + 1)
+            yield Block(page, k + 1, fence[1], "\n".join(lines[k + 1 : end]))
+            k = end
+        elif indented:
+            end = next((i for i in range(k, len(lines)) if not lines[i].startswith("    ")), len(lines))
+            yield Block(page, k + 1, "sh", "\n".join(line.strip() for line in lines[k:end]))
+            k = end
+        k += 1
+
+
+def commands(text: str) -> list[str]:
+    """The commands of a shell block, without comments and without the words that explain them in a second column."""
+    lines = text.replace("\\\n", " ").splitlines()
+    plain = (re.split(r"\s{2,}|\s#", line)[0].strip() for line in lines if not line.startswith("#"))
+    return [line for line in plain if line]
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with what the pages take for granted: a user's scenarios, a checkout's generated/."""
+    for name in ("my_arm.toml", "my_scenario.toml"):
+        (tmp_path / name).touch()
+    shutil.copytree(ROOT / "generated", tmp_path / "generated")
+    monkeypatch.chdir(tmp_path)
+    shorten(monkeypatch)
+    return tmp_path
+
+
+def shorten(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the commands simulate for some steps only."""
+    load_scenario, load_sweep = scenarios.load_scenario, sweeps.load_sweep
+
+    def short(scenario: scenarios.Scenario) -> scenarios.Scenario:
+        return scenario.with_overrides({"simulation.duration": STEPS * scenario.step})
+
+    def loaded(*arguments: Any, **options: Any) -> scenarios.Scenario:
+        return short(load_scenario(*arguments, **options))
+
+    def swept(*arguments: Any, **options: Any) -> sweeps.Sweep:
+        whole = load_sweep(*arguments, **options)
+        return replace(whole, scenario=short(whole.scenario))
+
+    # tests/runner/test_plots.py looks at the figures, whose drawing would take most of the time.
+    monkeypatch.setattr(plots, "figure_files", lambda name, figure: {f"{name}.png": b"", f"{name}.svg": b""})
+    monkeypatch.setattr(scenarios, "load_scenario", loaded)
+    monkeypatch.setattr(sweeps, "load_sweep", swept)
+
+
+def run_shell(block: Block) -> None:
+    for line in commands(block.text):
+        program, *arguments = shlex.split(line)
+        if line in ELSEWHERE:
+            continue
+        assert program == "springline", f"{block}: no way to run this here: {line}"
+        result = CliRunner().invoke(app, arguments, prog_name="springline")
+        assert result.exit_code == 0, f"{block}: {line}\n{result.output}{result.exception!r}"
+
+
+def run_python(block: Block) -> None:
+    if "pandas" in block.text:
+        pytest.importorskip("pandas")
+    try:
+        exec(compile("\n" * block.line + block.text, str(block.page), "exec"), {})  # noqa: S102
+    except Exception as error:
+        raise AssertionError(f"{block}: {error!r}") from error
+
+
+def run_toml(block: Block) -> None:
+    """A scenario or a sweep; records that it names are made up for it."""
+    document = tomllib.loads(block.text)
+    for table in document.values():
+        if isinstance(table, dict) and table.get("kind") == "table":
+            write_record(Path(table["path"]), list(table["columns"].values()), float(table.get("t0", 0.0)))
+    file = Path("documented.toml")
+    file.write_text(block.text, encoding="utf-8")
+    try:
+        if kind_of(document) == "sweep":
+            sweeps.load_sweep(file)
+        else:
+            scenarios.load_scenario(file)
+    except Exception as error:
+        raise AssertionError(f"{block}: {error!r}") from error
+
+
+def write_record(path: Path, columns: list[str], t0: float) -> None:
+    """A smooth record in which the first column is time, from a second before `t0` on."""
+    rows = [[t0 - 1.0 + 0.1 * k, *(0.01 * math.sin(0.3 * k + i) for i in range(1, len(columns)))] for k in range(200)]
+    path.write_text("\n".join([",".join(columns), *(",".join(f"{x:.6f}" for x in row) for row in rows)]) + "\n")
+
+
+C_AROUND = """
+#include "springline.h"
+static springline_controller controller;
+static int status;
+static void log(const char *text) {{ (void)text; }}
+void documented(void);
+void documented(void) {{
+    (void)controller; (void)status; (void)log;
+{text}
+}}
+"""
+
+
+def run_c(block: Block) -> None:
+    """A piece of a function around a controller whose gains are tunable."""
+    made = CliRunner().invoke(app, ["export", "c", "paper/nominal", "-o", "documented", "--tunable", "control"])
+    assert made.exit_code == 0, made.output
+    flags = ["-std=c99", "-Wall", "-Werror", "-fno-builtin", "-fsyntax-only", "-Idocumented/include", "-x", "c", "-"]
+    done = subprocess.run(
+        [*find_compiler().argv, *flags],
+        input=C_AROUND.format(text=block.text),
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, f"{block}: {done.stderr}"
+
+
+RUNNERS: dict[str, Callable[[Block], None]] = {"sh": run_shell, "python": run_python, "toml": run_toml, "c": run_c}
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if any(blocks(page))], ids=lambda page: page.name)
+@pytest.mark.usefixtures("place")
+def test_every_block_of_a_page_works(page: Path) -> None:
+    for block in blocks(page):
+        assert block.language in RUNNERS, f"{block}: no way to run a block in {block.language or 'no language'}"
+        RUNNERS[block.language](block)
+
+
+def test_what_is_run_elsewhere_is_documented() -> None:
+    shown = {
+        line for page in PAGES for block in blocks(page) if block.language == "sh" for line in commands(block.text)
+    }
+    assert set(ELSEWHERE) <= shown
+
+
+# --- commands within the text ----------------------------------------------------------------------------
+
+INLINE = [
+    pytest.param(code, id=f"{page.name}: {code}")
+    for page in PAGES
+    for code in dict.fromkeys(re.findall(rf"(?<!`)`((?:{'|'.join(PROGRAMS)})\s[^`]+)`", page.read_text("utf-8")))
+]
+# Words that stand for something; whatever else is written large is a command's own word.
+PLACEHOLDERS = {"SCENARIO": "paper/nominal", "DIR": "out", "SWEEP": "gains", "N": "1", "NAMES": "all", "NAME": "arm"}
+
+
+@pytest.mark.parametrize("code", INLINE)
+def test_commands_within_the_text_exist_with_their_options(code: str) -> None:
+    program, *arguments = [PLACEHOLDERS.get(word, word) for word in shlex.split(code)]
+    match program:
+        case "springline":
+            result = CliRunner().invoke(app, [*arguments, "--help"], prog_name="springline")
+            assert result.exit_code == 0, result.output
+        case "make":
+            folder = ROOT / "examples" / arguments[1] if arguments[0] == "-C" else ROOT
+            assert re.search(rf"^{arguments[-1]}:", (folder / "Makefile").read_text(), re.MULTILINE)
+        case "python":
+            module = arguments[1].replace(".", "/") + ".py" if arguments[0] == "-m" else f"examples/{arguments[0]}"
+            assert (ROOT / module).is_file()
+        case "fmpy":
+            shown = subprocess.run(
+                [Path(sys.executable).with_name("fmpy"), arguments[0], "--help"],
+                check=True,
+                capture_output=True,
+                text=True,
+            ).stdout
+            assert all(option in shown for option in arguments if option.startswith("--"))
+        case "pip":
+            (wanted,) = (word for word in arguments if word.startswith((".", "springline")))
+            extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+            assert set(re.findall(r"\[(\w+)\]", wanted)) <= set(extras)
+        case _:
+            pytest.fail(f"no way to check {code}")
