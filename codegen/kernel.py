@@ -12,22 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen import toolchain
-from springline.codegen.doubles import doubles
 from springline.codegen.kernel_source import ONE_RUN, Engine, KernelOptions, KernelSource, print_kernel
 from springline.codegen.memory import memory
-from springline.codegen.numbers import real, shown, whole
+from springline.codegen.numbers import doubles, real, shown, whole
 from springline.codegen.program import Program, program
 from springline.codegen.tables import Table
-from springline.model.base import COORDINATES
-from springline.model.parameters import Joint
-from springline.model.system import Structure, TableLayout
+from springline.model import quantities
+from springline.model.system import Structure, System, TableLayout
 
 __all__ = [
     "CHATTERING",
     "METRICS",
     "MOST_STEPS",
     "ONE_RUN",
-    "ROW",
     "STATUS",
     "Control",
     "Engine",
@@ -46,25 +43,11 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 
-METRICS = (
-    "response_time",
-    "settling_time",
-    "overshoot",
-    "steady_state_error",
-    "iae",
-    "U_max",
-    "chatter",
-    "U_tv",
-    "sigma_tv",
-    "dq1_tv",
-)
-"""Per joint, in the order of metrics.h."""
+METRICS = tuple(metric.name for metric in quantities.METRICS)
+"""Names of the metrics of each joint, in their order."""
 
 STATUS = ("ok", "diverged", "out_of_bounds", "stopped")
 """In the order of simulate.h."""
-
-ROW = ("q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U")
-"""Quantities of each joint, in the order of a trajectory row: they follow t, and the base coordinates follow them."""
 
 CHATTERING = 20.0
 """1/s: a command whose `chatter` is larger chatters. Clean runs have 0 to 1.3."""
@@ -92,6 +75,8 @@ class LoopSettings:
     output_every: int = 0
     response_band: float = 0.10
     settling_band: float = 0.05
+    response_error: float = 0.0
+    settling_error: float = 0.0
     start_time: float = 0.0
 
     def __post_init__(self) -> None:
@@ -103,6 +88,8 @@ class LoopSettings:
             "output_every": whole("output_every", self.output_every, 0, MOST_STEPS),
             "response_band": real("response_band", self.response_band),
             "settling_band": real("settling_band", self.settling_band),
+            "response_error": real("response_error", self.response_error),
+            "settling_error": real("settling_error", self.settling_error),
             "start_time": real("start_time", self.start_time),
         }
         for name, value in checked.items():
@@ -188,6 +175,8 @@ class _Job(_Struct):
         ("output_every", ctypes.c_int64),
         ("response_band", ctypes.c_double),
         ("settling_band", ctypes.c_double),
+        ("response_error", ctypes.c_double),
+        ("settling_error", ctypes.c_double),
         ("parameters", ctypes.c_void_p),
         ("tables", ctypes.c_void_p),
         ("metrics", ctypes.c_void_p),
@@ -235,7 +224,7 @@ class Kernel:
         self._simulate: Any = handle.springline_simulate
         self._simulate.restype = None
         system = program.system
-        self._states, self._columns = system.x.numel(), 1 + len(ROW) * system.n + len(COORDINATES)
+        self._states, self._columns = system.x.numel(), len(system.trajectory)
         self.width = _checked_layout(
             handle.springline_layout,
             ctypes.sizeof(_Job),
@@ -243,7 +232,7 @@ class Kernel:
             len(self.parameters),
             len(system.tables),
             self._states,
-            system.n * len(METRICS),
+            len(system.metrics),
             self._columns,
             len(STATUS),
         )
@@ -311,6 +300,8 @@ class Kernel:
             output_every=settings.output_every,
             response_band=settings.response_band,
             settling_band=settings.settling_band,
+            response_error=settings.response_error,
+            settling_error=settings.settling_error,
             parameters=parameters.ctypes.data,
             tables=ctypes.addressof(c_tables),
             metrics=result.metrics.ctypes.data,
@@ -354,9 +345,9 @@ def chatters(chatter: Floats, duration: Floats | float) -> NDArray[np.bool_]:
     return np.asarray((chatter > CHATTERING) & (chatter * (np.asarray(duration) / 2.0) > _SWINGS), dtype=np.bool_)
 
 
-def quantity_name(joints: Sequence[Joint], quantity: int) -> str:
+def quantity_name(system: System, quantity: int) -> str:
     """Column name of what left its bound, "dq2_lift"; `quantity` as in Runs."""
-    return f"{ROW[quantity // len(joints)]}_{joints[quantity % len(joints)].name}"
+    return system.trajectory[1 + quantity].name
 
 
 def compile_kernel(

@@ -14,6 +14,7 @@ from springline.codegen import casadi_c, lanes, toolchain
 from springline.codegen.program import Program
 from springline.codegen.stepping import kernel_update
 from springline.model.base import COORDINATES
+from springline.model.quantities import METRICS
 
 Engine = Literal["lanes", "casadi"]
 
@@ -82,6 +83,7 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
     }
     assert program.size("d") == len(program.system.tables) + 4 * channels
     enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
+    metrics = "".join(f"  SL_{metric.name.upper()},\n" for metric in METRICS)
     return f"""#define SL_W {width}
 #define SL_G {groups}
 #define SL_PACKS {packs}
@@ -97,6 +99,10 @@ typedef struct {{
 }} sl_time;
 
 enum {{ {enum} }};
+
+enum {{
+{metrics}  SL_METRICS_PER_JOINT
+}};
 
 /* On vectors an evaluation stands by itself: inlined into the loop it would share its registers, and spill them. */
 #if SL_W > 1

@@ -26,7 +26,25 @@ from springline.model.linear import as_written
 from springline.model.mechanism import Mechanism
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot
-from springline.model.quantities import BASE, DQ1, DQ2, Q1, REFERENCE, U_F, U_S, Quantity
+from springline.model.quantities import (
+    BASE,
+    DQ1,
+    DQ2,
+    METRICS,
+    Q1,
+    Q1D,
+    REFERENCE,
+    SIGMA,
+    U_F,
+    U_S,
+    B,
+    E,
+    Entry,
+    Quantity,
+    T,
+    U,
+    entries,
+)
 from springline.model.signals import CONSTANT_ZERO, Signal
 from springline.model.sliding import A_MAX, LAWS, SURFACE_PARAMETERS, LogForm, SurfaceExponents
 
@@ -270,6 +288,16 @@ class System:
     def command_parts(self) -> tuple[Quantity, ...]:
         """What the command is the sum of, before its limit."""
         return (U_S, U_F) if self.structure.drive == "elastic" else (U_S,)
+
+    @property
+    def trajectory(self) -> tuple[Entry, ...]:
+        """Columns of a trajectory, in the order of the loop's rows."""
+        return entries((T, *self.drive.state, Q1D, E, SIGMA, U, B), self.joints)
+
+    @property
+    def metrics(self) -> tuple[Entry, ...]:
+        """Columns of a table of metrics: each for every joint."""
+        return entries(METRICS, self.joints)
 
     @cached_property
     def functions(self) -> dict[str, ca.Function]:

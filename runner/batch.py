@@ -412,7 +412,7 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
         raise InputError(Problem(scenario.source, "", text, str(lengths)))
     slots, runs = scenario.slots_for(arrays), max(lengths.values())
     work = work_for(scenario, slots)
-    result = metrics_table(work.system.joints, _over_threads(work, work.chosen(slots, runs), jobs))
+    result = metrics_table(work.system, _over_threads(work, work.chosen(slots, runs), jobs))
     keys = scenario.numeric_keys()
     for position, (key, array) in enumerate(arrays.items()):
         result = result.add_column(position, unit_field(key, keys[key].unit), pa.array(array, pa.float64()))

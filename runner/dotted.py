@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from springline.codegen.doubles import doubles
+from springline.codegen.numbers import doubles
 from springline.runner.errors import shortened
 
 _LONGEST_PATH = 16  # no document has keys of ten parts, and each part is a call

@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from springline.codegen.doubles import double
+from springline.codegen.numbers import double
 from springline.model.parameters import Bounds
 from springline.runner import sampling
 from springline.runner.errors import InputError, Problem, unknown
@@ -204,13 +204,13 @@ class Plan:
         """One row a run of a chunk with the given columns: run, every key of the sweep, every metric, status, t_end."""
         runs = np.arange(chunk.first, chunk.first + chunk.runs)
         keys = [pa.array(columns[item.name], item.type) for item in self.key_fields]
-        metrics = metrics_table(chunk.group.work.system.joints, outcome.runs)
+        metrics = metrics_table(chunk.group.work.system, outcome.runs)
         return pa.Table.from_arrays([pa.array(runs), *keys, *metrics.columns], schema=self.schema)
 
     @cached_property
     def schema(self) -> pa.Schema:
         """Columns of the dataset's table."""
-        metrics = metrics_schema(self.groups[0].work.system.joints)
+        metrics = metrics_schema(self.groups[0].work.system)
         return pa.schema([field("run", "", pa.int64()), *self.key_fields, *metrics])
 
     @cached_property

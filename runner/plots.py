@@ -185,7 +185,10 @@ class _Run:
 
     def __init__(self, scenario: Scenario, result: Result) -> None:
         self.joints: tuple[Joint, ...] = scenario.system().joints
-        self.bands = (scenario.response_band, scenario.settling_band)
+        self.bands = (
+            (scenario.response_band, scenario.response_error),
+            (scenario.settling_band, scenario.settling_error),
+        )
         self.status, self.message = result.status, result.message
         self._table: pa.Table = result.trajectory
         self._metrics: dict[str, Any] = result.metrics.to_pylist()[0]
@@ -253,8 +256,11 @@ def _error(run: _Run) -> Figure:
     for axes, joint in pairs:
         e = run[f"e_{joint.name}"]
         start = abs(float(e[0]))
-        for band, shade in ((response, "0.90"), (settling, "0.78")) if start else ():
-            axes.axhspan(-band * start, band * start, color=shade, linewidth=0, label=f"±{100 * band:g} % of |e(0)|")
+        for (band, limit), shade in ((response, "0.90"), (settling, "0.78")):
+            half = band * start + limit
+            if half:
+                label = f"±{100 * band:g} % of |e(0)|" if band else f"±{limit:g} {joint.unit}"
+                axes.axhspan(-half, half, color=shade, linewidth=0, label=label)
         draw(axes, run.t, e, "error", **LINES[0])
         for metric, name, mark in (("response_time", "response time", "o"), ("settling_time", "settling time", "s")):
             at = run.metric(metric, joint)

@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from springline.codegen.doubles import doubles
+from springline.codegen.numbers import doubles
 from springline.model.base import COORDINATES
 from springline.model.drive import DRIVES, DriveKind
 from springline.model.mechanisms import MECHANISMS
@@ -116,13 +116,23 @@ class Scenario:
 
     @property
     def response_band(self) -> float:
-        """Fraction of |e_i(0)| that defines the response time."""
-        return float(self._simulation["response_band"])
+        """Fraction of |e_i(0)| that defines the response time; 0 where an absolute error does."""
+        return float(self._simulation.get("response_band", 0.0))
 
     @property
     def settling_band(self) -> float:
-        """Fraction of |e_i(0)| that defines the settling time."""
-        return float(self._simulation["settling_band"])
+        """Fraction of |e_i(0)| that defines the settling time; 0 where an absolute error does."""
+        return float(self._simulation.get("settling_band", 0.0))
+
+    @property
+    def response_error(self) -> float:
+        """|e_i| that defines the response time, SI; 0 where the band does."""
+        return float(self._simulation.get("response_error", 0.0))
+
+    @property
+    def settling_error(self) -> float:
+        """|e_i| that defines the settling time, SI; 0 where the band does."""
+        return float(self._simulation.get("settling_error", 0.0))
 
     @property
     def _simulation(self) -> dict[str, Any]:
@@ -302,6 +312,9 @@ class Scenario:
             sections = {name: shape.sections[name] for name in ("plant", "control", "initial")}
             for name, section in (sections | {"drive": shape.kinds["drive"][str(drive)]}).items():
                 document[name] = {k: v for k, v in document[name].items() if k in section.model_fields}
+        for name, other in (*schema.BANDS, *((other, name) for name, other in schema.BANDS)):
+            if f"simulation.{name}" in overrides:
+                document["simulation"].pop(other, None)
         given = {key.split(".")[1] for key in overrides if key.startswith("initial.")}
         if overrides.get("initial.on_reference"):
             document.pop("initial", None)

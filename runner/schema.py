@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal, cast, get_args
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError, create_model
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
-from springline.codegen.doubles import double
 from springline.codegen.kernel import MOST_STEPS
+from springline.codegen.numbers import double
 from springline.model.base import COORDINATES
 from springline.model.drive import DRIVES, EPSILON, DriveKind
 from springline.model.integrators import INTEGRATORS
@@ -216,15 +216,22 @@ class ControlStructure(Section):
 
 
 class Simulation(Section):
-    """[simulation]: time, output and thresholds of the metrics (fractions of |e_i(0)|)."""
+    """[simulation]: time, output and thresholds of the metrics (bands: fractions of |e_i(0)|; errors: |e_i|)."""
 
     duration: Annotated[float, number("s", POSITIVE)] = 4.0
     step: Annotated[float, number("s", POSITIVE)] = 1e-4
     integrator: Annotated[str, choice("integrator", INTEGRATORS)] = _DEFAULT.integrator
     output_every: Annotated[int, whole(MOST_STEPS)] = 10
     bound: Annotated[float, number("SI", LIMIT)] = 1e6
-    response_band: Annotated[float, number("1", UNIT_OPEN)] = 0.10
-    settling_band: Annotated[float, number("1", UNIT_OPEN)] = 0.05
+    response_band: Annotated[float | None, number("1", UNIT_OPEN)] = None
+    settling_band: Annotated[float | None, number("1", UNIT_OPEN)] = None
+    response_error: Annotated[float | None, number("SI", POSITIVE)] = None
+    settling_error: Annotated[float | None, number("SI", POSITIVE)] = None
+
+
+BANDS = (("response_band", "response_error"), ("settling_band", "settling_error"))
+"""Keys of [simulation] that exclude each other."""
+DEFAULT_BANDS = {"response_band": 0.10, "settling_band": 0.05}
 
 
 class NoMotion(Section):

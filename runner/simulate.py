@@ -15,7 +15,6 @@ from springline.codegen.kernel import (
     CHATTERING,
     METRICS,
     ONE_RUN,
-    ROW,
     STATUS,
     Control,
     Engine,
@@ -28,7 +27,6 @@ from springline.codegen.kernel import (
     quantity_name,
 )
 from springline.codegen.memory import memory
-from springline.model.base import COORDINATES
 from springline.model.parameters import Joint
 from springline.model.system import System
 from springline.runner.errors import InputError, Problem
@@ -40,27 +38,13 @@ _MOST_ROWS = 10_000_000
 _COPIES = 3  # of a trajectory in memory: the loop's rows, the table's columns, the file
 Progress = Callable[[float], None]
 
-_ROW_UNITS = {"dq1": "{q}/s", "dq2": "{q}/s", "sigma": "{q}/s", "U": "{F}"}  # all others are coordinates
-_METRIC_UNITS = {
-    "response_time": "s",
-    "settling_time": "s",
-    "overshoot": "{q}",
-    "steady_state_error": "{q}",
-    "iae": "{q} s",
-    "U_max": "{F}",
-    "chatter": "1/s",
-    "U_tv": "{F}",
-    "sigma_tv": "{q}/s",
-    "dq1_tv": "{q}/s",
-}
-
 
 @dataclass(frozen=True, slots=True)
 class Result:
     """What a run gave.
 
-    trajectory  columns t, q1_, dq1_, q2_, dq2_, q1d_, e_, sigma_, U_ per joint and the base coordinates
-    metrics     one row; see metrics.h for their definitions; null where there is none
+    trajectory  columns as System.trajectory has them: t, the state, q1d_, e_, sigma_, U_ per joint, the base
+    metrics     one row, columns as System.metrics has them; null where there is none
     status      "ok", "diverged" or "out_of_bounds"
     message     one sentence: for a run that stopped, the quantity and the time at which it left its bound; for one that
                 chatters, how much
@@ -79,33 +63,24 @@ def field(name: str, unit: str, kind: pa.DataType | None = None) -> pa.Field:
 
 def trajectory_schema(system: System) -> pa.Schema:
     """Columns of a trajectory, in the order of the loop's rows."""
-    per_joint = [
-        field(f"{quantity}_{j.name}", _ROW_UNITS.get(quantity, "{q}").format(q=j.unit, F=j.force))
-        for quantity in ROW
-        for j in system.joints
-    ]
-    return pa.schema([field("t", "s"), *per_joint, *(field(c.symbol, c.unit) for c in COORDINATES)])
+    return pa.schema([field(entry.name, entry.unit) for entry in system.trajectory])
 
 
-def metrics_schema(joints: Sequence[Joint]) -> pa.Schema:
+def metrics_schema(system: System) -> pa.Schema:
     """Columns of a table of metrics, metric by metric, then status and t_end."""
-    units = [
-        field(f"{metric}_{j.name}", _METRIC_UNITS[metric].format(q=j.unit, F=j.force))
-        for metric in METRICS
-        for j in joints
-    ]
-    return pa.schema([*units, field("status", "", pa.string()), field("t_end", "s")])
+    judged = [field(entry.name, entry.unit) for entry in system.metrics]
+    return pa.schema([*judged, field("status", "", pa.string()), field("t_end", "s")])
 
 
-def metrics_table(joints: Sequence[Joint], runs: Runs) -> pa.Table:
+def metrics_table(system: System, runs: Runs) -> pa.Table:
     """Metrics of all runs, one row each."""
     columns: list[pa.Array] = []
     for k in range(len(METRICS)):
-        for j in range(len(joints)):
+        for j in range(system.n):
             values = runs.metrics[:, j, k]
             columns.append(pa.array(values, mask=np.isnan(values)))
     status = pa.array([STATUS[i] for i in runs.status], pa.string())
-    return pa.Table.from_arrays([*columns, status, pa.array(runs.end_time)], schema=metrics_schema(joints))
+    return pa.Table.from_arrays([*columns, status, pa.array(runs.end_time)], schema=metrics_schema(system))
 
 
 def loop_settings(scenario: Scenario, *, trajectory: bool) -> LoopSettings:
@@ -118,6 +93,8 @@ def loop_settings(scenario: Scenario, *, trajectory: bool) -> LoopSettings:
         output_every=scenario.output_every if trajectory else 0,
         response_band=scenario.response_band,
         settling_band=scenario.settling_band,
+        response_error=scenario.response_error,
+        settling_error=scenario.settling_error,
     )
 
 
@@ -127,7 +104,7 @@ def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tup
     if status == "ok":
         return status, f"done: {end:g} s in {settings.steps} steps{_chatter_text(system.joints, runs, run)}"
     place = int(runs.quantity[run])
-    quantity = quantity_name(system.joints, place)
+    quantity = quantity_name(system, place)
     left = "the finite numbers" if status == "diverged" else f"its bound (|{quantity}| <= {settings.bound:g})"
     if place < system.x.numel():
         when = f"at t = {end + settings.step:g} s; results end at t = {end:g} s"
@@ -165,7 +142,7 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     rows = runs.trajectory[0, : runs.rows[0]]
     trajectory = pa.Table.from_arrays([pa.array(column) for column in rows.T], schema=trajectory_schema(system))
     status, message = outcome(system, runs, 0, settings)
-    return Result(trajectory, metrics_table(system.joints, runs), status, message)
+    return Result(trajectory, metrics_table(system, runs), status, message)
 
 
 def row_size(scenario: Scenario) -> int:

@@ -34,7 +34,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
-from springline.codegen.doubles import double
+from springline.codegen.numbers import double
 from springline.runner.errors import InputError, Problem, unknown
 from springline.runner.locate import expect_kind, packaged_sweeps, scenarios_folder
 from springline.runner.scenario import Scenario, load_scenario

@@ -18,8 +18,8 @@
 #include <string.h>
 
 #include "kernel.h"
-#include "metrics.h"
 #include "simulate.h"
+#include "metrics.h"
 
 enum {
   SL_PACK = SL_W * SL_G,
@@ -197,7 +197,7 @@ static void observe(sl_pack *pack, int64_t k, sl_time now) {
   for (i = 0; k == 0 && i < SL_NJ; i++) {
     for (g = 0; g < SL_G; g++) {
       sl_metrics_start(&pack->metrics[i][g], pack->e[i][g], pack->u[i][g], pack->sigma[i][g], pack->x[SL_NJ + i][g],
-                       job->response_band, job->settling_band);
+                       job);
     }
   }
   if (!control_is_finite(pack)) stop_overflows(pack, k, now);

@@ -1,41 +1,21 @@
 /*
  * metrics.h - what a run is judged by, accumulated while it runs, so that no trajectory need be kept.
  *
- * Per joint, with e the tracking error and T the run's duration:
- *   response time       first t with |e| <= response_band |e(0)|
- *   settling time       last t with |e| > settling_band |e(0)|; NaN if that is within the last 2 % of the run
- *   overshoot           largest excursion of e past zero, against the sign of e(0)
- *   steady-state error  largest |e| over the last quarter of the run
- *   iae                 integral of |e|, by the trapezoid rule
- *   U_max               largest |U|
- *   chatter             total variation of U over the second half of the run, by that half's length and by the range of
- *                       U in it, or 1e-3 of U_max where that is more, 1/s; 0 for a U that stands still
- *   U, sigma, dq1 tv    total variation after the settling time
+ * Per joint. What each metric is stands with its declaration (METRICS in model/quantities.py), from which kernel.h has
+ * the enumeration SL_RESPONSE_TIME ... SL_METRICS_PER_JOINT.
+ *
  * Samples are taken at the beginning of every step, and at the end. NaN stands for "there is none": never reached, not
  * settled, e(0) = 0, the run stopped before, or before its first sample.
  */
 #ifndef SL_METRICS_H
 #define SL_METRICS_H
 
-enum {
-  SL_RESPONSE_TIME,
-  SL_SETTLING_TIME,
-  SL_OVERSHOOT,
-  SL_STEADY_STATE_ERROR,
-  SL_IAE,
-  SL_U_MAX,
-  SL_CHATTER,
-  SL_U_TV,
-  SL_SIGMA_TV,
-  SL_DQ1_TV,
-  SL_METRICS_PER_JOINT
-};
-
 /* Accumulators of one joint on one group of lanes. */
 typedef struct {
   sl_v response_band, settling_band, side; /* thresholds on |e|; sign of e(0) */
-  sl_v value[SL_METRICS_PER_JOINT];        /* of iae, the sum of |e|; of chatter, the total variation */
+  sl_v value[SL_METRICS_PER_JOINT];        /* of integrals the sum over samples; of chatter, the total variation */
   sl_v first_size, size;                   /* |e| of the first sample, and of the last */
+  sl_v first_u;
   sl_v least_u, most_u;                    /* since the run began, in its second half since that began */
   sl_v u, sigma, dq1;                      /* of the last sample */
 } sl_metrics;
@@ -47,19 +27,19 @@ typedef struct {
   int late;                  /* it lies in the run's last quarter */
 } sl_instant;
 
-static inline void sl_metrics_start(sl_metrics *m, sl_v e, sl_v u, sl_v sigma, sl_v dq1, double response_band,
-                                    double settling_band) {
+/* The bands are band |e(0)| + error: one of the two is 0. */
+static inline void sl_metrics_start(sl_metrics *m, sl_v e, sl_v u, sl_v sigma, sl_v dq1, const sl_job *job) {
   int i;
   for (i = 0; i < SL_METRICS_PER_JOINT; i++) m->value[i] = slv_set(0.0);
   m->value[SL_RESPONSE_TIME] = slv_set(SL_INF);
   m->value[SL_U_MAX] = slv_set(-SL_INF);
   m->least_u = slv_set(SL_INF);
   m->most_u = slv_set(-SL_INF);
-  m->response_band = slv_fabs(e) * slv_set(response_band);
-  m->settling_band = slv_fabs(e) * slv_set(settling_band);
+  m->response_band = slv_fabs(e) * slv_set(job->response_band) + slv_set(job->response_error);
+  m->settling_band = slv_fabs(e) * slv_set(job->settling_band) + slv_set(job->settling_error);
   m->side = slv_sign(e);
   m->first_size = m->size = slv_fabs(e);
-  m->u = u;
+  m->u = m->first_u = u;
   m->sigma = sigma;
   m->dq1 = dq1;
 }
@@ -77,7 +57,9 @@ static inline void sl_metrics_sample(sl_metrics *m, sl_instant now, sl_v e, sl_v
   v[SL_SETTLING_TIME] = slv_select(outside, t, v[SL_SETTLING_TIME]);
   v[SL_OVERSHOOT] = slv_fmax(v[SL_OVERSHOOT], -(e * m->side));
   if (now.late) v[SL_STEADY_STATE_ERROR] = slv_fmax(v[SL_STEADY_STATE_ERROR], size);
+  v[SL_RMS_ERROR] = v[SL_RMS_ERROR] + size * size;
   v[SL_IAE] = v[SL_IAE] + size;
+  v[SL_U_RMS] = v[SL_U_RMS] + u * u;
   if (now.half_begins) {
     v[SL_U_MAX] = sl_largest(m);
     m->least_u = m->most_u = u;
@@ -94,24 +76,37 @@ static inline void sl_metrics_sample(sl_metrics *m, sl_instant now, sl_v e, sl_v
   m->dq1 = dq1;
 }
 
+/* Integral by the trapezoid rule, h apart, of what has this sum over the samples, and began and ended so. */
+static inline double sl_integral(double sum, double first, double last, double h) {
+  return h * (sum - 0.5 * (first + last));
+}
+
 /*
  * Metrics of lane j into out[SL_METRICS_PER_JOINT]. `h` is the time between samples, `half` the length of the run's second
  * half, s; `complete` is 0 for a run that stopped before its end.
  */
 static inline void sl_metrics_finish(const sl_metrics *m, int j, double start, double end, double h, double half,
                                      int complete, double *out) {
+  const double first_e = slv_get(m->first_size, j), last_e = slv_get(m->size, j), first_u = slv_get(m->first_u, j);
+  const double last_u = slv_get(m->u, j), time = end - start;
   const double range = slv_get(m->most_u, j) - slv_get(m->least_u, j), largest = slv_get(sl_largest(m), j);
   int i, settled;
   for (i = 0; i < SL_METRICS_PER_JOINT; i++) out[i] = slv_get(m->value[i], j);
-  if (slv_get(m->side, j) == 0.0) out[SL_RESPONSE_TIME] = out[SL_OVERSHOOT] = SL_NAN;
-  if (!(out[SL_RESPONSE_TIME] < SL_INF)) out[SL_RESPONSE_TIME] = SL_NAN;
-  settled = complete && slv_get(m->side, j) != 0.0 && out[SL_SETTLING_TIME] <= start + 0.98 * (end - start);
+  if (slv_get(m->side, j) == 0.0) out[SL_OVERSHOOT] = SL_NAN;
+  if (!(slv_get(m->response_band, j) > 0.0 && out[SL_RESPONSE_TIME] < SL_INF)) out[SL_RESPONSE_TIME] = SL_NAN;
+  settled = complete && slv_get(m->settling_band, j) > 0.0 && out[SL_SETTLING_TIME] <= start + 0.98 * time;
   if (!settled) out[SL_SETTLING_TIME] = out[SL_U_TV] = out[SL_SIGMA_TV] = out[SL_DQ1_TV] = SL_NAN;
-  out[SL_IAE] = h * (out[SL_IAE] - 0.5 * (slv_get(m->first_size, j) + slv_get(m->size, j)));
+  out[SL_IAE] = sl_integral(out[SL_IAE], first_e, last_e, h);
+  out[SL_RMS_ERROR] = sl_integral(out[SL_RMS_ERROR], first_e * first_e, last_e * last_e, h);
+  out[SL_U_RMS] = sl_integral(out[SL_U_RMS], first_u * first_u, last_u * last_u, h);
+  out[SL_RMS_ERROR] = time > 0.0 ? sl_sqrt(sl_fmax(out[SL_RMS_ERROR], 0.0) / time) : last_e;
+  out[SL_U_RMS] = time > 0.0 ? sl_sqrt(sl_fmax(out[SL_U_RMS], 0.0) / time) : sl_fabs(last_u);
   out[SL_U_MAX] = sl_fabs(largest);
   if (out[SL_CHATTER] > 0.0) out[SL_CHATTER] = out[SL_CHATTER] / half / sl_fmax(range, 1e-3 * out[SL_U_MAX]);
   if (!complete) out[SL_STEADY_STATE_ERROR] = out[SL_CHATTER] = SL_NAN;
-  if (largest < 0.0) out[SL_OVERSHOOT] = out[SL_IAE] = out[SL_U_MAX] = SL_NAN;
+  if (largest < 0.0) {
+    out[SL_OVERSHOOT] = out[SL_RMS_ERROR] = out[SL_IAE] = out[SL_U_MAX] = out[SL_U_RMS] = SL_NAN;
+  }
 }
 
 #endif

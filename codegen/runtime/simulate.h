@@ -19,8 +19,10 @@ typedef struct {
   double bound;                 /* a run stops when any |x_i| leaves it */
   int64_t hold;                 /* sampled control: steps per sample, >= 1; continuous control ignores it */
   int64_t output_every;         /* a trajectory row every so many steps, and at the end; 0: no trajectory */
-  double response_band;         /* fraction of |e_i(0)| */
-  double settling_band;         /* fraction of |e_i(0)| */
+  double response_band;         /* fraction of |e_i(0)|, 0 where response_error counts */
+  double settling_band;         /* fraction of |e_i(0)|, 0 where settling_error counts */
+  double response_error;        /* |e_i|, SI */
+  double settling_error;        /* |e_i|, SI */
   const double *parameters;     /* runs x SL_NP */
   const sl_table *tables;       /* SL_NTABLES tables */
   double *metrics;              /* runs x SL_NMETRICS */

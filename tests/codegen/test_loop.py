@@ -112,8 +112,8 @@ def metrics_by_hand(rows: NDArray[np.float64], joint: int, settings: LoopSetting
     """The definitions of metrics.h on a trajectory with every step."""
     t, e, sigma, u, rate = rows[:, 0], rows[:, 11 + joint], rows[:, 13 + joint], rows[:, 15 + joint], rows[:, 3 + joint]
     size, start, late = np.abs(e), abs(e[0]), 4 * np.arange(len(t)) >= 3 * settings.steps
-    inside = np.flatnonzero(size <= settings.response_band * start)
-    outside = np.flatnonzero(size > settings.settling_band * start)
+    inside = np.flatnonzero(size <= settings.response_band * start + settings.response_error)
+    outside = np.flatnonzero(size > settings.settling_band * start + settings.settling_error)
     last = outside[-1]
     second = u[settings.steps // 2 :]
     half = (settings.steps - settings.steps // 2) * settings.step
@@ -123,8 +123,10 @@ def metrics_by_hand(rows: NDArray[np.float64], joint: int, settings: LoopSetting
         "settling_time": t[last] if t[last] <= 0.98 * t[-1] else math.nan,
         "overshoot": max(0.0, (-e * np.sign(e[0])).max()),
         "steady_state_error": size[late].max(),
+        "rms_error": math.sqrt(np.trapezoid(e**2, t) / (t[-1] - t[0])),
         "iae": np.trapezoid(size, t),
         "U_max": np.abs(u).max(),
+        "U_rms": math.sqrt(np.trapezoid(u**2, t) / (t[-1] - t[0])),
         "chatter": np.abs(np.diff(second)).sum() / half / scale,
         "U_tv": np.abs(np.diff(u[last:])).sum(),
         "sigma_tv": np.abs(np.diff(sigma[last:])).sum(),
@@ -142,6 +144,24 @@ def test_metrics_follow_their_definitions(steps: int, sampled: bool, shaken: Pro
         expected = metrics_by_hand(result.trajectory[0], joint, settings)
         for k, name in enumerate(METRICS):
             assert result.metrics[0, joint, k] == pytest.approx(expected[name], rel=1e-9), name
+
+
+def test_absolute_bands_judge_a_run_that_starts_on_its_reference(shaken: Program, values_of: Values) -> None:
+    """Fractions of e(0) = 0 are no bands; errors in SI units are, and overshoot has no side to be on."""
+    on_reference = {"initial.q.0": 0.0, "initial.q.1": 1.0, "initial.dq.0": math.pi, "initial.dq.1": math.pi / 2}
+    settings = LoopSettings(8000, 1e-4, output_every=1)
+    absolute = replace(settings, response_band=0.0, settling_band=0.0, response_error=2e-3, settling_error=1e-3)
+    relative, result = (run(shaken, values_of(shaken, on_reference), each) for each in (settings, absolute))
+    assert result.trajectory is not None
+    for joint in range(2):
+        by_name = dict(zip(METRICS, relative.metrics[0, joint], strict=True))
+        assert all(math.isnan(by_name[name]) for name in ("response_time", "settling_time", "overshoot", "U_tv"))
+        expected = metrics_by_hand(result.trajectory[0], joint, absolute)
+        found = dict(zip(METRICS, result.metrics[0, joint], strict=True))
+        assert math.isnan(found.pop("overshoot"))
+        assert found["response_time"] == 0.0
+        for name, value in found.items():
+            np.testing.assert_allclose(value, expected[name], rtol=1e-9, err_msg=name)
 
 
 def motion(base: Program, accelerations: Callable[[ca.SX, ca.SX], ca.SX]) -> Program:
@@ -325,7 +345,7 @@ def test_control_that_overflows_ends_the_run_and_is_named(
     settings = LoopSettings(40, 1e-4, hold=3, output_every=7, bound=math.inf)
     kernel = compile_kernel(shaken, sampled, options)
     result = kernel.run(values, settings)
-    names = [quantity_name(shaken.system.joints, quantity) for quantity in result.quantity[::2]]
+    names = [quantity_name(shaken.system, quantity) for quantity in result.quantity[::2]]
     assert names == list(OVERFLOWS)
     assert {STATUS[status] for status in result.status[::2]} == {"diverged"}
     assert (result.end_time[::2] == 0.0).all()
@@ -359,7 +379,7 @@ def test_control_that_overflows_later_ends_the_run_there(
     settings = LoopSettings(400, 1e-4, hold=8, output_every=1)
     result = run(tabled, values, settings, sampled=sampled, tables=tables, options=options)
     assert STATUS[result.status[0]] == "diverged"
-    assert quantity_name(tabled.system.joints, int(result.quantity[0])) == "sigma_lift"
+    assert quantity_name(tabled.system, int(result.quantity[0])) == "sigma_lift"
     assert result.end_time[0] == 0.02
     before = run(tabled, values, LoopSettings(199, 1e-4, hold=8), sampled=sampled, tables=tables, options=options)
     assert result.trajectory is not None and result.rows is not None

@@ -22,16 +22,18 @@ def springline(*arguments: str | Path) -> Result:
 
 
 def test_every_metric_has_the_unit_of_what_it_measures() -> None:
-    joints = load_scenario("paper/nominal").system().joints
-    schema = metrics_schema(joints)
+    system = load_scenario("paper/nominal").system()
+    joints, schema = system.joints, metrics_schema(system)
     found = {field.name: field.metadata[b"unit"].decode() for field in schema}
     expected = {
         "response_time": ("s", "s"),
         "settling_time": ("s", "s"),
         "overshoot": ("m", "rad"),
         "steady_state_error": ("m", "rad"),
+        "rms_error": ("m", "rad"),
         "iae": ("m s", "rad s"),
         "U_max": ("N", "N m"),
+        "U_rms": ("N", "N m"),
         "chatter": ("1/s", "1/s"),
         "U_tv": ("N", "N m"),
         "sigma_tv": ("m/s", "rad/s"),

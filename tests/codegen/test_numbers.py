@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from springline.codegen.doubles import double, doubles
+from springline.codegen.numbers import double, doubles
 from springline.runner import batch, load_scenario
 from springline.runner.errors import InputError
 from springline.runner.scenario import Scenario
