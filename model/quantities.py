@@ -132,5 +132,5 @@ METRICS = (
     Quantity("sigma_tv", r"TV(\sigma)", "{q}/s", "total variation of the sliding variable after the settling time"),
     Quantity("dq1_tv", r"TV(\dot q_1)", "{q}/s", "total variation of the joint rate after the settling time"),
 )
-"""What a run is judged by, in the order of the columns; runtime/metrics.h computes them. Null where there is none: never
-reached, not settled, e(0) = 0, or the run stopped before."""
+"""What a run is judged by, in the order of the columns; runtime/metrics.h computes them. Null where there is none:
+never reached, not settled, e(0) = 0, or the run stopped before."""

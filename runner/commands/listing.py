@@ -113,7 +113,7 @@ def _rows(table: str, declared: tuple[Parameter, ...], joints: tuple[Joint, ...]
         yield {
             "key": f"{table}.{item.name}",
             "unit": units[0] if len(set(units)) == 1 else units,
-            "default": list(item.default) if isinstance(item.default, tuple) else item.default,
+            "default": list(item.defaults(joints)) if item.per_joint else item.defaults(joints)[0],
             "bounds": str(item.bounds),
             "meaning": item.meaning,
         }

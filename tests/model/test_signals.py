@@ -3,9 +3,9 @@
 import casadi as ca
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
-from springline.model.signals import cubic, sine_sum
+from springline.model.signals import cubic, sine_sum, via_points
 from springline.model.system import SignalShape, Structure
 
 REFERENCE = {"reference.lift.terms.0.amplitude": 1.0, "reference.lift.terms.0.omega": np.pi}
@@ -120,3 +120,43 @@ def test_acceleration_is_continuous_at_the_knots(table):
         left = model("signals", knots[k], table_data(knots, signals, k - 1, knots[k] - knots[k - 1]))
         right = model("signals", knots[k], table_data(knots, signals, k, 0.0))
         np.testing.assert_allclose(left, right, atol=1e-11)
+
+
+def via(times, values):
+    """The polynomial reference as a function of t: value, rate, acceleration."""
+    t = ca.SX.sym("t")
+    signal = via_points(t, [ca.SX(x) for x in times], [ca.SX(x) for x in values])
+    return ca.Function("via", [t], [signal.value, signal.rate, signal.acceleration])
+
+
+def test_two_points_are_the_quintic_of_least_jerk():
+    found = via([0.5, 2.5], [0.8, -1.0])
+    for t in (0.5, 0.9, 1.7, 2.5):
+        s = (t - 0.5) / 2.0
+        expected = (
+            0.8 - 1.8 * (10 * s**3 - 15 * s**4 + 6 * s**5),
+            -1.8 * (30 * s**2 - 60 * s**3 + 30 * s**4) / 2.0,
+            -1.8 * (60 * s - 180 * s**2 + 120 * s**3) / 4.0,
+        )
+        np.testing.assert_allclose([float(x) for x in found(t)], expected, atol=1e-13)
+
+
+@pytest.mark.parametrize("count", [3, 4, 7])
+def test_via_points_are_joined_by_the_quintic_spline_at_rest_at_both_ends(count, rng):
+    times, values = np.cumsum(rng.uniform(0.2, 1.5, count)), rng.uniform(-2, 2, count)
+    rest = [(1, 0.0), (2, 0.0)]
+    spline = make_interp_spline(times, values, k=5, bc_type=(rest, rest))
+    found = via(times, values)
+    for t in np.linspace(times[0], times[-1], 57):
+        value, rate, acceleration = (float(x) for x in found(t))
+        scale = np.abs(spline.derivative(2)(np.linspace(times[0], times[-1], 500))).max()
+        assert value == pytest.approx(float(spline(t)), abs=1e-9)
+        assert rate == pytest.approx(float(spline.derivative()(t)), abs=1e-9 * scale)
+        assert acceleration == pytest.approx(float(spline.derivative(2)(t)), abs=1e-9 * scale)
+
+
+def test_outside_its_points_a_polynomial_stands_still_exactly():
+    found = via([0.0, 1.0, 2.0], [0.3, 0.9, 0.1])
+    for t, value in ((-5.0, 0.3), (0.0, 0.3), (2.0, 0.1), (2.0000001, 0.1), (1e9, 0.1)):
+        assert [float(x) for x in found(t)] == [value, 0.0, 0.0]
+    assert [float(x) for x in via([3.0], [0.7])(1.0)] == [0.7, 0.0, 0.0]
