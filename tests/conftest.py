@@ -32,6 +32,12 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.fixture(autouse=True)
+def _no_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands print whole lines, as into a pipe, whatever width a shell or a library has left in the environment."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+
 @pytest.fixture(scope="session")
 def require_tool() -> Callable[..., str]:
     """``require_tool(name, hint="")``: the path of a program that a test needs.

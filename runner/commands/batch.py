@@ -120,10 +120,11 @@ def _describe(plan: Plan, cost: Estimate, pool: Pool, destination: str, *, as_js
         ["groups", f"{len(plan.groups)}"],
         ["chunks", _chunks_text(plan)],
         ["threads", f"{pool.threads}"],
-        ["size", f"about {size_text(cost.bytes)} in {destination}"],
+        ["size", f"about {size_text(cost.bytes)}"],
         ["time", f"about {time_text(cost.seconds)}, less where runs diverge"],
     ]
-    print_table(["sweep", plan.sweep.source], rows)
+    print_table(["sweep", Path(plan.sweep.source).name], rows)
+    say(f"results: would go to {destination}")
 
 
 def _chunks_text(plan: Plan) -> str:

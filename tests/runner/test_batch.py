@@ -455,15 +455,15 @@ def test_replay_of_a_part_that_is_not_whole_says_so(sweep: Path, tmp_path: Path,
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["batch", "paper/nominal"], "paper/nominal: is a scenario, expected a sweep: springline run paper/nominal"),
-        (["batch", "mine.toml"], "mine.toml: is a scenario, expected a sweep: springline run mine.toml"),
-        (["batch", "data"], "data: is a dataset, expected a sweep: springline replay data RUN, or springline batch"),
-        (["replay", "sweep.toml", "0"], "sweep.toml: is a sweep, expected a dataset: springline batch sweep.toml"),
-        (["replay", "gains", "0"], "gains: is a sweep, expected a dataset: springline batch gains"),
-        (["replay", "mine.toml", "0"], "is a scenario, expected a dataset: springline run mine.toml"),
+        (["batch", "paper/nominal"], "paper/nominal: this is a scenario: springline run paper/nominal"),
+        (["batch", "mine.toml"], "mine.toml: this is a scenario: springline run mine.toml"),
+        (["batch", "data"], "data: this is a dataset: springline replay data RUN, or springline batch"),
+        (["replay", "sweep.toml", "0"], "sweep.toml: this is a sweep: springline batch sweep.toml"),
+        (["replay", "gains", "0"], "gains: this is a sweep: springline batch gains"),
+        (["replay", "mine.toml", "0"], "this is a scenario: springline run mine.toml"),
         (
             ["replay", "one run", "0"],
-            "is a folder of a run, expected a dataset: springline run 'one run/scenario.toml'",
+            "one run: this is a folder of a run: its scenario is one run/scenario.toml",
         ),
     ],
 )
