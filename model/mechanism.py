@@ -14,8 +14,9 @@ import casadi as ca
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.signals import SineTerm
 
-# Of the critical damping of a motor on its spring: what the fast control adds unless a mechanism says otherwise.
-_FAST_DAMPING = 0.1
+# Of the critical damping of a motor on its spring: what the fast control adds unless a mechanism says otherwise. The slow
+# law eats much of it (docs/paper.md, E13), so it is no small share.
+_FAST_DAMPING = 0.5
 
 
 class Mechanism(ABC):
@@ -69,7 +70,7 @@ class Mechanism(ABC):
     def fitted(self, parameter: Parameter) -> Parameter:
         """A parameter of the controller with the default that suits this arm.
 
-        K_f, unless `control_defaults` has it, damps each motor on its spring with a tenth of the critical damping.
+        K_f, unless `control_defaults` has it, damps each motor on its spring with half of the critical damping.
         """
         own = self.control_defaults.get(parameter.name)
         if own is None and parameter.name == "K_f":

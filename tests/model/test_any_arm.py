@@ -37,7 +37,7 @@ def test_nothing_of_the_papers_arm_leaks_into_another(other_arm):
     n = len(mechanism.joints)
     defaults = {item.name: item.defaults(mechanism.joints) for item in control_parameters(mechanism)}
     critical = 2 * np.sqrt(0.05 * 4.0e3)  # of a motor of 0.05 kg m^2 on a spring of 4 kN m/rad
-    np.testing.assert_allclose(defaults["K_f"], [0.1 * critical] * n)
+    np.testing.assert_allclose(defaults["K_f"], [0.5 * critical] * n)
     assert defaults["mu"] == mechanism.control_defaults.get("mu", (5.0,) * n)
     assert defaults["U_max"] == (np.inf,) * n
     assert defaults["a_max"] == (200.0,) * n
