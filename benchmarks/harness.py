@@ -25,6 +25,7 @@ from springline.benchmarks import problem, roofline
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, ours
 from springline.codegen import toolchain
+from springline.codegen.kernel import kernel
 
 PACKAGES = ("casadi", "jax", "numba", "numpy", "scipy")
 
@@ -226,7 +227,7 @@ def _refer(entries: list[_Entry], peak: float) -> None:
         entry.row.ratio = entry.row.ns_per_eval / measures[entry.contender.control].ns_per_eval
     if "continuous" in measures:
         row = measures["continuous"]
-        row.flops_per_eval = roofline.flops_per_evaluation(ours.default_kernel("continuous"))
+        row.flops_per_eval = roofline.flops_per_evaluation(kernel(ours.DEFAULT["continuous"]))
         row.roofline_share = row.flops_per_eval / row.ns_per_eval / peak
 
 

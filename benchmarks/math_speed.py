@@ -66,9 +66,7 @@ def _seconds(evaluate: Callable[[int, int, int], None], function: int, way: int)
 
 def calls() -> Counter[str]:
     """The elementary functions that one evaluation with continuous control calls, with how often."""
-    values = ours.values()
-    del values["control.delta"]
-    text = lanes.emit(program(ours.STRUCTURE), values, 1).text
+    text = lanes.emit(program(ours.STRUCTURE), ours.DEFAULT["continuous"].constants, 1).text
     start = text.index("void kernel_closed(")
     return Counter(_CALL.findall(text[start : text.index("\n}\n", start)]))
 

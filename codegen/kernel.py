@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen import toolchain
-from springline.codegen.kernel_source import ONE_RUN, Engine, KernelOptions, KernelSource, print_kernel
+from springline.codegen.kernel_source import KernelSource, print_kernel
+from springline.codegen.kernel_spec import ONE_RUN, Engine, KernelOptions, KernelSpec
 from springline.codegen.memory import memory
 from springline.codegen.numbers import doubles, real, shown, whole
 from springline.codegen.program import Program, program
 from springline.codegen.tables import Table
 from springline.model import quantities
-from springline.model.system import Structure, System, TableLayout
+from springline.model.system import System, TableLayout
 
 __all__ = [
     "CHATTERING",
@@ -30,6 +31,7 @@ __all__ = [
     "Engine",
     "Kernel",
     "KernelOptions",
+    "KernelSpec",
     "LayoutError",
     "LoopSettings",
     "Runs",
@@ -350,21 +352,15 @@ def quantity_name(system: System, quantity: int) -> str:
     return system.trajectory[1 + quantity].name
 
 
-def compile_kernel(
-    program: Program, sampled: bool = False, options: KernelOptions | None = None, baked: tuple[float, ...] = ()
-) -> Kernel:
+def compile_kernel(program: Program, spec: KernelSpec) -> Kernel:
     """Print and compile the Kernel of a Program; see `print_kernel`. Raises ToolchainError."""
-    options = options or KernelOptions()
-    return Kernel(program, print_kernel(program, sampled, options, baked), options.compiler)
+    return Kernel(program, print_kernel(program, spec), spec.options.compiler)
 
 
 @lru_cache(maxsize=64)
-def kernel(
-    structure: Structure, sampled: bool = False, options: KernelOptions | None = None, baked: tuple[float, ...] = ()
-) -> Kernel:
-    """The Kernel of a structure, compiled on first need and then remembered.
+def kernel(spec: KernelSpec) -> Kernel:
+    """The Kernel of a spec, compiled on first need and then remembered.
 
-    baked  values of all slots, in their order, for a kernel with baked parameters; () when every slot is tunable
     Raises ToolchainError when there is no C compiler or it fails.
     """
-    return compile_kernel(program(structure), sampled, options, baked)
+    return compile_kernel(program(spec.structure), spec)

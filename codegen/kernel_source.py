@@ -8,44 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
-from typing import Literal
 
 from springline.codegen import casadi_c, lanes, toolchain
+from springline.codegen.kernel_spec import KernelOptions, KernelSpec
 from springline.codegen.program import Program
 from springline.codegen.stepping import kernel_update
 from springline.model.base import COORDINATES
 from springline.model.quantities import METRICS
 
-Engine = Literal["lanes", "casadi"]
-
 _RUNTIME = ("loop.c", "metrics.h", "simulate.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
-
-
-@dataclass(frozen=True, slots=True)
-class KernelOptions:
-    """How a kernel is printed and compiled; none of it changes a bit of the results.
-
-    engine   "lanes" or "casadi" (the reference, one run at a time, every parameter tunable)
-    width    lanes in a vector, None for the machine's
-    groups   vectors worked on at once to hide latency, None for what pays
-    packs    so many times width x groups runs go through time side by side, None for what pays
-    tunable  slot keys that each run may set for itself, None for all; the others are baked
-    flags    optimisation flags, None for the best this machine can do
-    compiler  None for the one that is found
-    """
-
-    engine: Engine = "lanes"
-    width: int | None = None
-    groups: int | None = None
-    packs: int | None = None
-    tunable: tuple[str, ...] | None = None
-    flags: tuple[str, ...] | None = None
-    compiler: toolchain.Compiler | None = None
-
-
-ONE_RUN = KernelOptions(width=2, groups=1, packs=1)
-"""For a run by itself: two lanes, the second repeats the first. The idle lane costs nothing, and in vector registers
-the bits of a double are at hand, without a detour through integer registers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,32 +85,26 @@ enum {{
 {kernel_update(program.system.tableau)}"""
 
 
-def print_kernel(
-    program: Program, sampled: bool, options: KernelOptions, baked: tuple[float, ...] = ()
-) -> KernelSource:
-    """Print the kernel of a Program.
+def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
+    """Print the kernel of a Program, which is that of the spec's structure.
 
-    sampled  control once per sample (zero-order hold) instead of in every stage
-    baked    values of all slots, in their order; needed when `options.tunable` leaves some out
-    Raises UnprintableOperation, ToolchainError when there is no compiler to ask how wide its vectors are.
+    Raises ValueError for a Program of another structure, UnprintableOperation, ToolchainError when there is no compiler
+    to ask how wide its vectors are.
     """
-    slots, size = program.system.slots, program.size
+    if program.system.structure != spec.structure:
+        raise ValueError(f"the program is of {program.system.structure}, expected {spec.structure}")
+    slots, size, sampled, options = program.system.slots, program.size, spec.sampled, spec.options
     if options.engine == "casadi":
         sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
         start = preamble(program, width=1, groups=1, packs=1, sampled=sampled, sizes=sizes)
         parameters = tuple(slot.key for slot in slots)
         files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}
     else:
-        tunable = options.tunable
-        constants: dict[str, float] = {}
-        if tunable is not None:
-            pairs = zip(slots, baked, strict=True)
-            constants = {slot.key: value for slot, value in pairs if slot.key not in tunable}
         width = options.width or toolchain.native_vector_width(options.compiler)
         groups = options.groups or (2 if width > 1 else 1)
         # The plant alone is a short evaluation and a long chain: others have to fill its gaps.
         packs = options.packs or (2 if sampled and width > 1 else 1)
-        emission = lanes.emit(program, constants, groups)
+        emission = lanes.emit(program, spec.constants, groups)
         start = preamble(program, width=width, groups=groups, packs=packs, sampled=sampled, sizes=emission.sizes)
         parameters = emission.tunable
         files = {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}"}

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 import pyarrow as pa
 
-from springline.codegen.kernel import ONE_RUN, LoopSettings, kernel
+from springline.codegen.kernel import ONE_RUN, KernelSpec, LoopSettings, kernel
 from springline.codegen.program import program
 from springline.model import theory
 from springline.model.sliding import SurfaceExponents
@@ -315,7 +315,7 @@ def _linear(scenario: Scenario) -> Result:
         if slot.key == "control.lambda":
             values[i] = 0.0
     settings = LoopSettings(scenario.steps, scenario.step, scenario.bound, output_every=scenario.output_every)
-    runs = kernel(structure, False, ONE_RUN).run(values[None, :], settings)
+    runs = kernel(KernelSpec(structure, options=ONE_RUN)).run(values[None, :], settings)
     assert runs.trajectory is not None
     trajectory = pa.Table.from_arrays(
         [pa.array(column) for column in runs.trajectory[0].T], schema=trajectory_schema(system)

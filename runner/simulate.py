@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from threading import Thread
-from typing import get_args
 
 import numpy as np
 import pyarrow as pa
@@ -19,6 +18,7 @@ from springline.codegen.kernel import (
     Control,
     Engine,
     Kernel,
+    KernelSpec,
     LoopSettings,
     Runs,
     Table,
@@ -130,10 +130,9 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     million rows or not fit into memory, ValueError for an unknown engine, ToolchainError if there is no C compiler.
     """
     expect_scenario(scenario)
-    if engine not in get_args(Engine):
-        raise ValueError(f"engine is {engine!r}, expected one of {', '.join(get_args(Engine))}")
+    options = replace(ONE_RUN, engine=engine)
     refuse_large(scenario)
-    loop = kernel(scenario.structure(), scenario.control_every > 0, replace(ONE_RUN, engine=engine))
+    loop = kernel(KernelSpec(scenario.structure(), scenario.control_every > 0, options=options))
     settings = loop_settings(scenario, trajectory=True)
     tables = kernel_tables(scenario.tables())
     runs = _watched(loop, scenario.values()[None, :], settings, tables, progress)

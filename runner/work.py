@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from hashlib import sha256
 from threading import Lock
 
@@ -16,12 +16,13 @@ from springline.codegen.c_tokens import tokens
 from springline.codegen.kernel import (
     Control,
     Kernel,
+    KernelSpec,
     LoopSettings,
     Runs,
     Table,
     kernel,
 )
-from springline.codegen.kernel_source import KernelOptions, KernelSource, print_kernel, runtime_sources
+from springline.codegen.kernel_source import KernelSource, print_kernel, runtime_sources
 from springline.codegen.manifest import canonical_json
 from springline.codegen.program import program
 from springline.model.system import Structure, System
@@ -36,26 +37,23 @@ Floats = NDArray[np.float64]
 class Work:
     """Runs of one structure and timing that differ in the tunable slots alone. Each is equal to itself only.
 
-    tunable   keys of these slots;  baked  values of all slots, those of the tunable ones are not used
+    spec      of the kernel: what varies is tunable, the rest baked
     settings  of the loop, with the rows of a trajectory (which only kept runs write)
     """
 
-    structure: Structure
-    sampled: bool
-    tunable: tuple[str, ...]
-    baked: tuple[float, ...]
+    spec: KernelSpec
     settings: LoopSettings
     tables: tuple[Table, ...]
 
     @property
     def system(self) -> System:
         """The System of the structure."""
-        return program(self.structure).system
+        return program(self.spec.structure).system
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Slot keys in the order of the columns that a run takes; a tunable slot that nothing reads has none."""
-        return self._emission[1]
+        return _emitted(self.spec)[1]
 
     @property
     def identity(self) -> str:
@@ -63,27 +61,18 @@ class Work:
 
         Of the C it takes the tokens: who resumes a dataset after a comment was edited gets the same bits.
         """
-        return self._emission[0]
-
-    @cached_property
-    def _emission(self) -> tuple[str, tuple[str, ...]]:
-        return _emitted(self.structure, self.sampled, self.tunable, self.baked)
-
-    @property
-    def options(self) -> KernelOptions:
-        """How its kernel is printed: what varies is tunable, the rest baked."""
-        return KernelOptions(tunable=self.tunable)
+        return _emitted(self.spec)[0]
 
     def kernel(self) -> Kernel:
         """The kernel, compiled on first need. Raises ToolchainError."""
         with _COMPILING:
-            return kernel(self.structure, self.sampled, self.options, self.baked)
+            return kernel(self.spec)
 
     def chosen(self, slots: Slots, runs: int) -> Floats:
         """What each run takes of `slots`, (runs, parameters)."""
-        for slot, baked in zip(self.system.slots, self.baked, strict=True):
-            if slot.key not in self.tunable and not np.all(slots[slot.key] == baked):
-                raise AssertionError(f"{slot.key}, which was taken for constant, varies")
+        for key, value in self.spec.constants.items():
+            if not np.all(slots[key] == value):
+                raise AssertionError(f"{key}, which was taken for constant, varies")
         return per_run(slots, self.parameters, runs)
 
 
@@ -92,13 +81,10 @@ _COMPILING = Lock()
 
 
 @lru_cache(maxsize=512)
-def _emitted(
-    structure: Structure, sampled: bool, tunable: tuple[str, ...], baked: tuple[float, ...]
-) -> tuple[str, tuple[str, ...]]:
-    slots = program(structure).system.slots
-    constants = {slot.key: value for slot, value in zip(slots, baked, strict=True) if slot.key not in tunable}
-    emission = lanes.emit(program(structure), constants, 1)
-    text = canonical_json({**_runtime_tokens(), "kernel.h": tokens(emission.text), "sampled": sampled})
+def _emitted(spec: KernelSpec) -> tuple[str, tuple[str, ...]]:
+    """Identity and parameters of a kernel, whatever its options."""
+    emission = lanes.emit(program(spec.structure), spec.constants, 1)
+    text = canonical_json({**_runtime_tokens(), "kernel.h": tokens(emission.text), "sampled": spec.sampled})
     return sha256(text).hexdigest(), emission.tunable
 
 
@@ -109,14 +95,13 @@ def _runtime_tokens() -> dict[str, list[str]]:
 
 def work_for(scenario: Scenario, slots: Slots) -> Work:
     """The Work of a scenario's runs: a slot in which they differ is tunable, any other is baked."""
-    return Work(
+    spec = KernelSpec(
         scenario.structure(),
         scenario.control_every > 0,
         tuple(key for key, values in slots.items() if np.any(values != np.ravel(values)[0])),
         tuple(float(np.ravel(values)[0]) for values in slots.values()),
-        loop_settings(scenario, trajectory=True),
-        tuple(kernel_tables(scenario.tables())),
     )
+    return Work(spec, loop_settings(scenario, trajectory=True), tuple(kernel_tables(scenario.tables())))
 
 
 @dataclass(frozen=True)
@@ -163,8 +148,8 @@ class Parcel:
 def parcel(work: Work) -> Parcel:
     """Pack a Work. Raises ToolchainError where there is no compiler to say how wide vectors are."""
     with _COMPILING:
-        source = print_kernel(program(work.structure), work.sampled, work.options, work.baked)
-    return Parcel(work.structure, source, source.hash, work.settings, work.tables)
+        source = print_kernel(program(work.spec.structure), work.spec)
+    return Parcel(work.spec.structure, source, source.hash, work.settings, work.tables)
 
 
 def perform_parcel(parcel: Parcel, parameters: Floats, kept: Sequence[int] = ()) -> Outcome:

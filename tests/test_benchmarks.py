@@ -14,6 +14,7 @@ import pytest
 from springline.benchmarks import harness, math_speed, problem, roofline
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, handwritten_c, ours
+from springline.codegen.kernel import KernelOptions, kernel
 from springline.runner import bench
 from springline.runner.commands import bench as command
 
@@ -110,7 +111,9 @@ def test_compilers_are_timed_cold_and_cached() -> None:
 def test_operations_are_counted_in_the_machine_code(require_tool: Callable[..., str]) -> None:
     require_tool("objdump", "it comes with gcc, in binutils")
     counts = [
-        roofline.flops_per_evaluation(ours.build_kernel("continuous", replace(ours.DEFAULT, width=width, groups=2)))
+        roofline.flops_per_evaluation(
+            kernel(replace(ours.DEFAULT["continuous"], options=KernelOptions(width=width, groups=2)))
+        )
         for width in (2, 4)
     ]
     # The equations alone take about 250, the elementary functions as much again; the count belongs to one run,

@@ -6,21 +6,18 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from springline.benchmarks import problem
 from springline.codegen import toolchain
-from springline.codegen.kernel import Kernel, KernelOptions, LoopSettings, kernel
-from springline.codegen.kernel_source import ONE_RUN, best_flags
-from springline.codegen.program import program
-from springline.model.system import SignalShape, Structure
+from springline.codegen.kernel import ONE_RUN, KernelOptions, KernelSpec, LoopSettings, kernel
+from springline.codegen.kernel_source import best_flags
+from springline.model.system import SignalShape, Structure, System
 
 NAME = "springline"
 STRUCTURE = Structure(base_motion=SignalShape("sine", (1, 0, 0)))
-DEFAULT = KernelOptions(tunable=("control.delta",))
-"""One varied parameter, all others baked; the machine's vector width, and as many groups as pay."""
-
 # Two packs of the widest kernel (8 lanes, two groups), so that no kernel idles lanes.
 BATCH = 32
 WIDTHS = (1, 2, 4, 8)
@@ -38,25 +35,22 @@ _VALUES = {
 }
 
 
-def values() -> dict[str, float]:
-    """Every number of the system by its slot key: springline's defaults are the paper's."""
-    return {slot.key: _VALUES.get(slot.key, slot.default) for slot in program(STRUCTURE).system.slots}
+VALUES = {slot.key: _VALUES.get(slot.key, slot.default) for slot in System(STRUCTURE).slots}
+"""Every number of the system by its slot key: springline's defaults are the paper's."""
+
+DEFAULT: dict[problem.Control, KernelSpec] = {
+    mode: KernelSpec(STRUCTURE, mode == "sampled", ("control.delta",), tuple(VALUES.values())) for mode in problem.MODES
+}
+"""One varied parameter, all others baked; the machine's vector width, and as many groups as pay."""
 
 
-def build_kernel(mode: problem.Control, options: KernelOptions) -> Kernel:
-    """The compiled loop."""
-    baked = () if options.tunable is None else tuple(values().values())
-    return kernel(STRUCTURE, mode == "sampled", options, baked)
-
-
-def build(mode: problem.Control, options: KernelOptions, threads: int = 1) -> problem.Runner:
+def build(spec: KernelSpec, threads: int = 1) -> problem.Runner:
     """Runs are dealt to threads in equal parts; the loop releases the GIL."""
-    loop = build_kernel(mode, options)
-    known = values()
+    loop = kernel(spec)
     column = loop.parameters.index("control.delta")
 
     def run_part(delta: problem.Floats, steps: int) -> problem.Floats:
-        parameters = np.tile([known[key] for key in loop.parameters], (delta.size, 1))
+        parameters = np.tile([VALUES[key] for key in loop.parameters], (delta.size, 1))
         parameters[:, column] = delta
         return loop.run(parameters, LoopSettings(steps, problem.STEP)).final_state
 
@@ -73,17 +67,12 @@ def build(mode: problem.Control, options: KernelOptions, threads: int = 1) -> pr
 def build_fused(mode: problem.Control) -> problem.Runner:
     """The default, but free to fuse multiplications and additions: what equal bits on every machine cost."""
     flags = (*best_flags(toolchain.find_compiler()), "-ffp-contract=fast")
-    return build(mode, replace(DEFAULT, flags=flags))
+    return build(_printed(DEFAULT[mode], flags=flags))
 
 
 def reference(mode: problem.Control) -> problem.Runner:
     """What all others are compared with: the default, which has this machine's vector width."""
-    return build(mode, DEFAULT)
-
-
-def default_kernel(mode: problem.Control) -> Kernel:
-    """The compiled loop of the default."""
-    return build_kernel(mode, DEFAULT)
+    return build(DEFAULT[mode])
 
 
 def is_default(contender: problem.Contender) -> bool:
@@ -91,22 +80,19 @@ def is_default(contender: problem.Contender) -> bool:
     return contender.name == NAME and contender.variant == contender.control
 
 
-def _contender(
-    variant: str,
-    mode: problem.Control,
-    options: KernelOptions,
-    *,
-    batch: int = BATCH,
-    threads: int = 1,
-) -> problem.Contender:
+def _printed(spec: KernelSpec, **options: Any) -> KernelSpec:
+    return replace(spec, options=KernelOptions(**options))
+
+
+def _contender(variant: str, spec: KernelSpec, *, batch: int = BATCH, threads: int = 1) -> problem.Contender:
     return problem.Contender(
         NAME,
         variant,
-        mode,
-        partial(build, mode, options, threads),
+        "sampled" if spec.sampled else "continuous",
+        partial(build, spec, threads),
         batch=batch * threads,
         threads=threads,
-        compiles=threads == 1 and options.width is None,
+        compiles=threads == 1 and spec.options.width is None,
         tolerance=0.0,
     )
 
@@ -115,15 +101,16 @@ def contenders() -> tuple[problem.Contender, ...]:
     """Both control modes, each with the default first."""
     cores = os.cpu_count() or 1
     result = []
-    for mode in problem.MODES:
-        result.append(_contender(mode, mode, DEFAULT))
-        result += [_contender(f"{mode}, W = {width}", mode, replace(DEFAULT, width=width)) for width in WIDTHS]
-        result.append(_contender(f"{mode}, all tunable", mode, KernelOptions()))
+    for mode, default in DEFAULT.items():
+        free = replace(default, tunable=None, baked=())
+        result.append(_contender(mode, default))
+        result += [_contender(f"{mode}, W = {width}", _printed(default, width=width)) for width in WIDTHS]
+        result.append(_contender(f"{mode}, all tunable", free))
         result.append(problem.Contender(NAME, f"{mode}, FMA allowed", mode, partial(build_fused, mode), batch=BATCH))
         if cores > 1:
-            result.append(_contender(f"{mode}, {cores} threads", mode, DEFAULT, threads=cores))
-        result.append(_contender(f"{mode}, one run", mode, replace(ONE_RUN, tunable=DEFAULT.tunable), batch=1))
-        result.append(_contender(f"{mode}, casadi engine", mode, KernelOptions(engine="casadi"), batch=1))
+            result.append(_contender(f"{mode}, {cores} threads", default, threads=cores))
+        result.append(_contender(f"{mode}, one run", replace(default, options=ONE_RUN), batch=1))
+        result.append(_contender(f"{mode}, casadi engine", _printed(free, engine="casadi"), batch=1))
     return tuple(result)
 
 

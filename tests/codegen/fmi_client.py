@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from springline.codegen.fmu import Settings, fmu
-from springline.codegen.kernel import KernelOptions, LoopSettings, Table, kernel
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, Table, kernel
 from springline.codegen.program import Program
 from springline.model.base import COORDINATES
 
@@ -126,7 +126,7 @@ def own_run(
     tables: Sequence[Table] = (),
 ) -> NDArray[np.float64]:
     """Our own loop's rows, without t."""
-    loop = kernel(of.system.structure, sampled, KernelOptions(width=1, groups=1))
+    loop = kernel(KernelSpec(of.system.structure, sampled, options=KernelOptions(width=1, groups=1)))
     settings = LoopSettings(steps=steps, step=STEP, hold=round(PERIOD / STEP), output_every=every, start_time=start)
     trajectory = loop.run(values[None, :], settings, tables).trajectory
     assert trajectory is not None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen.kernel import KernelOptions, LoopSettings, compile_kernel
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, compile_kernel
 from springline.codegen.kernel_source import print_kernel
 from springline.codegen.program import Program
 
@@ -47,9 +47,9 @@ def test_aarch64_gives_the_same_bits(
     settings = LoopSettings(200, 1e-4)
     table = np.tile(values_of(shaken), (5, 1))
     table[:, 1] *= np.linspace(0.9, 1.1, 5)
-    expected = compile_kernel(shaken, False, KernelOptions()).run(table, settings)
+    expected = compile_kernel(shaken, KernelSpec(shaken.system.structure)).run(table, settings)
 
-    source = print_kernel(shaken, False, options)
+    source = print_kernel(shaken, KernelSpec(shaken.system.structure, options=options))
     for name, text in source.files:
         (tmp_path / name).write_text(text)
     (tmp_path / "driver.c").write_text(DRIVER % (len(table), settings.steps, settings.step))

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from springline.codegen import lanes, toolchain
-from springline.codegen.kernel import Engine, KernelOptions, LoopSettings, Runs, compile_kernel
+from springline.codegen.kernel import Engine, KernelOptions, KernelSpec, LoopSettings, Runs, compile_kernel
 from springline.codegen.operations import UnprintableOperation
 from springline.codegen.program import Program
 from springline.model.linear import as_written
@@ -36,10 +36,12 @@ def run(
     table: NDArray[np.float64],
     options: KernelOptions,
     *,
+    tunable: tuple[str, ...] | None = None,
     sampled: bool = False,
     settings: LoopSettings = SHORT,
 ) -> Runs:
-    kernel = compile_kernel(program, sampled, options, tuple(table[0]))
+    baked = () if tunable is None else tuple(table[0])
+    kernel = compile_kernel(program, KernelSpec(program.system.structure, sampled, tunable, baked, options))
     keys = [slot.key for slot in program.system.slots]
     return kernel.run(table[:, [keys.index(key) for key in kernel.parameters]], settings)
 
@@ -66,27 +68,32 @@ def reference(request: pytest.FixtureRequest, shaken: Program, table: NDArray[np
 
 
 LANES = [
-    KernelOptions(width=1, groups=1, flags=("-O0",)),
-    KernelOptions(width=1, groups=1, tunable=VARIED),
-    KernelOptions(width=2, groups=1, packs=3, flags=("-O1",)),
-    KernelOptions(width=4, groups=2, packs=2, flags=("-O2",), tunable=VARIED),
-    KernelOptions(width=4, groups=1),
-    KernelOptions(width=8, groups=2, flags=("-O2",)),
-    KernelOptions(width=16, groups=1, flags=("-O1",), tunable=VARIED),
-    KernelOptions(),
+    (KernelOptions(width=1, groups=1, flags=("-O0",)), None),
+    (KernelOptions(width=1, groups=1), VARIED),
+    (KernelOptions(width=2, groups=1, packs=3, flags=("-O1",)), None),
+    (KernelOptions(width=4, groups=2, packs=2, flags=("-O2",)), VARIED),
+    (KernelOptions(width=4, groups=1), None),
+    (KernelOptions(width=8, groups=2, flags=("-O2",)), None),
+    (KernelOptions(width=16, groups=1, flags=("-O1",)), VARIED),
+    (KernelOptions(), None),
 ]
 
 
 @pytest.mark.parametrize(
-    "options",
+    ("options", "tunable"),
     LANES,
-    ids=lambda o: f"W{o.width}G{o.groups}P{o.packs}{''.join(o.flags or ())}{'-baked' * bool(o.tunable)}",
+    ids=[f"W{o.width}G{o.groups}P{o.packs}{''.join(o.flags or ())}{'-baked' * bool(t)}" for o, t in LANES],
 )
 def test_lanes_equal_casadi(
-    options: KernelOptions, reference: tuple[bool, Runs], shaken: Program, table: NDArray[np.float64]
+    options: KernelOptions,
+    tunable: tuple[str, ...] | None,
+    reference: tuple[bool, Runs],
+    shaken: Program,
+    table: NDArray[np.float64],
 ) -> None:
     sampled, expected = reference
-    assert_same(run(shaken, table, options, sampled=sampled, settings=replace(SHORT, hold=5)), expected)
+    settings = replace(SHORT, hold=5)
+    assert_same(run(shaken, table, options, tunable=tunable, sampled=sampled, settings=settings), expected)
 
 
 @pytest.mark.parametrize("flags", [("-O0",), ("-O3", "-march=native")], ids=["O0", "O3native"])
@@ -124,8 +131,9 @@ def test_every_build(
         casadi = KernelOptions(engine="casadi", flags=flags, compiler=found)
         assert_same(run(shaken, table, casadi, sampled=sampled, settings=settings), expected)
         for width, groups, tunable in itertools.product((1, 2, 4, 8, 16), (1, 2), (None, VARIED)):
-            options = KernelOptions(width=width, groups=groups, tunable=tunable, flags=flags, compiler=found)
-            assert_same(run(shaken, table, options, sampled=sampled, settings=settings), expected)
+            options = KernelOptions(width=width, groups=groups, flags=flags, compiler=found)
+            result = run(shaken, table, options, tunable=tunable, sampled=sampled, settings=settings)
+            assert_same(result, expected)
 
 
 @pytest.mark.parametrize(
@@ -135,7 +143,7 @@ def test_every_build(
 )
 def test_neighbours_do_not_matter(options: KernelOptions, shaken: Program, table: NDArray[np.float64]) -> None:
     """A run alone, first in a pack, last in a pack, beside runs that diverge: the same bits."""
-    kernel = compile_kernel(shaken, False, options)
+    kernel = compile_kernel(shaken, KernelSpec(shaken.system.structure, options=options))
     together = kernel.run(table, SHORT)
     keys = [slot.key for slot in shaken.system.slots]
     wild = table.copy()
@@ -221,11 +229,9 @@ def test_random_functions_equal_casadi(seed: int, shaken: Program, table: NDArra
     settings = LoopSettings(steps=12, step=1e-2, output_every=3)
     expected = run(random, table[:9], KernelOptions(engine="casadi", flags=("-O1",)), settings=settings)
     assert np.isfinite(expected.final_state).all()
-    for options in (
-        KernelOptions(width=4, groups=2, flags=("-O1",)),
-        KernelOptions(width=2, tunable=VARIED, flags=("-O1",)),
-    ):
-        assert_same(run(random, table[:9], options, settings=settings), expected)
+    for width, tunable in ((4, None), (2, VARIED)):
+        options = KernelOptions(width=width, groups=2, flags=("-O1",))
+        assert_same(run(random, table[:9], options, tunable=tunable, settings=settings), expected)
 
 
 def test_an_operation_without_c_is_refused_by_name(shaken: Program) -> None:
@@ -318,12 +324,13 @@ def test_constants_keep_the_signs_of_their_zeros(shaken: Program, values_of: Val
         plant = ca.Function(old.name(), inputs, [slope], [old.name_in(i) for i in range(old.n_in())], ["dx"])
     signs = Program(shaken.system, {**shaken.functions, "plant": plant})
     table = values_of(shaken, {"initial.dq.0": -0.0, "initial.dq.1": 0.0, "initial.q.0": 0.0, "initial.q.1": 0.0})[None]
-    for options in (
-        KernelOptions(engine="casadi", flags=("-O1",)),
-        KernelOptions(width=2, flags=("-O1",)),
-        KernelOptions(width=1, tunable=(), flags=("-O1",)),
-        KernelOptions(width=2, tunable=(), flags=("-O1",)),
-        KernelOptions(width=2, tunable=("initial.dq.1",), flags=("-O1",)),
+    one_step = LoopSettings(steps=1, step=1.0)
+    for options, tunable in (
+        (KernelOptions(engine="casadi", flags=("-O1",)), None),
+        (KernelOptions(width=2, flags=("-O1",)), None),
+        (KernelOptions(width=1, flags=("-O1",)), ()),
+        (KernelOptions(width=2, flags=("-O1",)), ()),
+        (KernelOptions(width=2, flags=("-O1",)), ("initial.dq.1",)),
     ):
-        state = run(signs, table, options, settings=LoopSettings(steps=1, step=1.0)).final_state[0]
-        assert np.round(state).tolist() == [sign for _, sign in zeros], options
+        state = run(signs, table, options, tunable=tunable, settings=one_step).final_state[0]
+        assert np.round(state).tolist() == [sign for _, sign in zeros], (options, tunable)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from springline.codegen.api import generate_files
 from springline.codegen.export import bind
-from springline.codegen.kernel import KernelOptions, LoopSettings, kernel
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.codegen.manifest import write_tree
 from springline.codegen.typed import STATUS
 from springline.model.parameters import Slot
@@ -675,7 +675,7 @@ def test_the_exported_loop_gives_the_simulators_bits(scenario: str, tunable: str
     program = compile_c("cc", units, tmp_path / "main", *FLAGS)
     printed = columns(run(program, "1"))
 
-    loop = kernel(structure, True, KernelOptions(engine=engine, width=1, groups=1))
+    loop = kernel(KernelSpec(structure, True, options=KernelOptions(engine=engine, width=1, groups=1)))
     runs = loop.run(numbers[None], LoopSettings(steps=10_000, step=1e-4, hold=10, output_every=100))
     rows = runs.trajectory[0].T
     names = [

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate._ivp import dop853_coefficients, rk
 from scipy.linalg import expm
 
-from springline.codegen.kernel import KernelOptions, LoopSettings, kernel
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.system import SignalShape, Structure
 
@@ -30,7 +30,8 @@ def structure_of(integrator):
 
 
 def simulate(integrator, steps, **options):
-    loop = kernel(structure_of(integrator), True, KernelOptions(width=1, groups=1, packs=1, **options))
+    options = KernelOptions(width=1, groups=1, packs=1, **options)
+    loop = kernel(KernelSpec(structure_of(integrator), True, options=options))
     values = np.array([[VALUES.get(slot.key, slot.default) for slot in loop.program.system.slots]])
     settings = LoopSettings(steps, DURATION / steps, hold=steps, output_every=steps)
     runs = loop.run(values, settings)
@@ -68,8 +69,8 @@ def test_order(name):
 def test_engines_and_widths_agree_to_the_bit(name):
     reference, _ = simulate(name, 40, engine="casadi")
     np.testing.assert_array_equal(simulate(name, 40)[0], reference)
-    loop = kernel(structure_of(name), False, KernelOptions(width=4, groups=2))
-    scalar = kernel(structure_of(name), False, KernelOptions(engine="casadi"))
+    loop = kernel(KernelSpec(structure_of(name), options=KernelOptions(width=4, groups=2)))
+    scalar = kernel(KernelSpec(structure_of(name), options=KernelOptions(engine="casadi")))
     values = np.array([[VALUES.get(slot.key, slot.default) for slot in loop.program.system.slots]] * 9)
     values[:, loop.parameters.index("initial.q.0")] = np.linspace(-0.3, 0.4, 9)
     settings = LoopSettings(200, 1e-3, output_every=50)
@@ -108,7 +109,8 @@ def test_eighth_order_at_one_millisecond_beats_rk4_at_a_tenth():
               "reference.rotation.terms.0.omega": math.pi / 2, "initial.q.0": 0.8, "initial.q.1": 0.5}  # fmt: skip
 
     def final(integrator, per_sample):
-        loop = kernel(Structure(integrator=integrator), True, KernelOptions(width=1, groups=1, packs=1))
+        options = KernelOptions(width=1, groups=1, packs=1)
+        loop = kernel(KernelSpec(Structure(integrator=integrator), True, options=options))
         p = np.array([[values.get(slot.key, slot.default) for slot in loop.program.system.slots]])
         return loop.run(p, LoopSettings(600 * per_sample, 1e-3 / per_sample, hold=per_sample)).final_state[0, :2]
 

@@ -18,7 +18,9 @@ from springline.codegen.kernel import (
     MOST_STEPS,
     STATUS,
     Control,
+    Kernel,
     KernelOptions,
+    KernelSpec,
     LayoutError,
     LoopSettings,
     Runs,
@@ -44,6 +46,10 @@ def with_plant(base: Program, right_hand_side: Callable[[ca.SX], ca.SX]) -> Prog
     return Program(base.system, {**base.functions, "plant": plant})
 
 
+def compiled(base: Program, *, sampled: bool = False, options: KernelOptions = PLAIN) -> Kernel:
+    return compile_kernel(base, KernelSpec(base.system.structure, sampled, options=options))
+
+
 def run(
     base: Program,
     values: NDArray[np.float64],
@@ -53,7 +59,7 @@ def run(
     tables: tuple[Table, ...] = (),
     options: KernelOptions = PLAIN,
 ) -> Runs:
-    return compile_kernel(base, sampled, options).run(np.atleast_2d(values), settings, tables)
+    return compiled(base, sampled=sampled, options=options).run(np.atleast_2d(values), settings, tables)
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -64,7 +70,7 @@ def test_rk4_has_order_four(sampled: bool, shaken: Program, values_of: Values) -
         shaken, lambda x: ca.vertcat(*(e for i, w in enumerate(omega) for e in (w * x[2 * i + 1], -w * x[2 * i])))
     )
     values = values_of(shaken)
-    kernel = compile_kernel(rotating, sampled, PLAIN)
+    kernel = compiled(rotating, sampled=sampled)
     start = kernel.run(values[None, :], LoopSettings(0, 1.0)).final_state[0]
     angle = np.exp(-1j * omega * 2.0) * (start[0::2] + 1j * start[1::2])
     exact = np.stack([angle.real, angle.imag], axis=1).ravel()
@@ -97,7 +103,7 @@ def test_closed_loop_agrees_with_cvodes(values_of: Values) -> None:
         times[1:].tolist(),
         {"reltol": 1e-10, "abstol": 1e-12, "max_num_steps": 2_000_000},
     )
-    start = system.function("start")(values)
+    start = system.function("start")(0.0, ca.DM(0, 1), values)
     expected = np.array(cvodes(x0=start)["xf"]).T
     result = run(still, values, LoopSettings(40000, 1e-4, output_every=5000))
     assert result.trajectory is not None
@@ -343,7 +349,7 @@ def test_control_that_overflows_ends_the_run_and_is_named(
     sound = values_of(shaken, limits)
     values = np.stack([item for case in OVERFLOWS.values() for item in (values_of(shaken, {**limits, **case}), sound)])
     settings = LoopSettings(40, 1e-4, hold=3, output_every=7, bound=math.inf)
-    kernel = compile_kernel(shaken, sampled, options)
+    kernel = compiled(shaken, sampled=sampled, options=options)
     result = kernel.run(values, settings)
     names = [quantity_name(shaken.system, quantity) for quantity in result.quantity[::2]]
     assert names == list(OVERFLOWS)
@@ -435,7 +441,7 @@ def test_table_signals(options: KernelOptions, values_of: Values) -> None:
 
 
 def test_threads_share_nothing(shaken: Program, values_of: Values) -> None:
-    kernel = compile_kernel(shaken, False, KernelOptions())
+    kernel = compiled(shaken, options=KernelOptions())
     table = np.tile(values_of(shaken), (24, 1))
     table[:, 1] *= np.linspace(0.9, 1.1, 24)
     settings = LoopSettings(2000, 1e-4)
@@ -471,7 +477,7 @@ def test_rounding_and_flushing_of_the_process_do_not_matter(shaken: Program, val
     library = toolchain.load(
         toolchain.build_library({"environment.c": ENVIRONMENT}, main="environment.c", flags=("-std=c99", "-lm"))
     )
-    kernel = compile_kernel(shaken, False, PLAIN)
+    kernel = compiled(shaken)
     values = np.stack([values_of(shaken), values_of(shaken, {"initial.dq.0": 5e-324})])
     settings = LoopSettings(20, 1e-3)
     expected = kernel.run(values, settings)
@@ -487,7 +493,7 @@ def test_rounding_and_flushing_of_the_process_do_not_matter(shaken: Program, val
 
 @pytest.mark.parametrize("packs", [1, 3])
 def test_runs_can_be_watched_and_stopped(packs: int, shaken: Program, values_of: Values) -> None:
-    kernel = compile_kernel(shaken, False, replace(PLAIN, packs=packs))
+    kernel = compiled(shaken, options=replace(PLAIN, packs=packs))
     assert kernel.width == packs
     runs = np.tile(values_of(shaken), (2 * packs, 1))
     control = Control()
@@ -507,7 +513,7 @@ def test_runs_can_be_watched_and_stopped(packs: int, shaken: Program, values_of:
 
 
 def test_wrong_shapes_are_refused(shaken: Program, values_of: Values) -> None:
-    kernel = compile_kernel(shaken, False, PLAIN)
+    kernel = compiled(shaken)
     with pytest.raises(ValueError, match=r"expected \(runs, \d+\)"):
         kernel.run(np.zeros((2, 3)), LoopSettings(1, 1e-3))
     with pytest.raises(ValueError, match="the system has 0"):
@@ -572,7 +578,7 @@ def test_c_structures_take_no_number_that_they_would_change() -> None:
 def test_results_beyond_the_memory_are_refused_before_it_is_asked_for(
     shaken: Program, values_of: Values, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kernel = compile_kernel(shaken, False, PLAIN)
+    kernel = compiled(shaken)
     values = values_of(shaken)[None, :]
     with pytest.raises(ValueError, match=r"output_every is 1: 1 x 4398046511105 trajectory rows .* need 7.04e\+05 GB"):
         kernel.run(values, LoopSettings(2**42, 1e-12, output_every=1))
@@ -586,13 +592,13 @@ def test_a_metric_that_only_one_side_knows_is_an_error(shaken: Program, monkeypa
     with monkeypatch.context() as patch:
         patch.setattr(kernel_module, "METRICS", (*METRICS, "jerk"))
         with pytest.raises(LayoutError, match="metrics: 20, expected 22"):
-            compile_kernel(shaken, False, PLAIN)
+            compiled(shaken)
     sources = dict(kernel_source.runtime_sources())
     sources["metrics.h"] = sources["metrics.h"].replace("  SL_DQ1_TV,\n", "  SL_DQ1_TV,\n  SL_JERK,\n")
     with monkeypatch.context() as patch:
         patch.setattr(kernel_source, "runtime_sources", lambda: sources)
         with pytest.raises(LayoutError, match="metrics: 22, expected 20"):
-            compile_kernel(shaken, False, PLAIN)
+            compiled(shaken)
 
 
 def test_a_job_of_another_size_is_an_error(shaken: Program, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -602,4 +608,4 @@ def test_a_job_of_another_size_is_an_error(shaken: Program, monkeypatch: pytest.
     )
     monkeypatch.setattr(kernel_source, "runtime_sources", lambda: sources)
     with pytest.raises(LayoutError, match="bytes of a job: 184, expected 176"):
-        compile_kernel(shaken, False, PLAIN)
+        compiled(shaken)

@@ -15,7 +15,7 @@ from fmi_client import Client, client_library
 from springline.codegen.api import generate_files
 from springline.codegen.export import bind
 from springline.codegen.fmu import Settings, fmu
-from springline.codegen.kernel import KernelOptions, LoopSettings, kernel
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.codegen.manifest import write_tree
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS
@@ -61,7 +61,7 @@ def structure_of(mechanism: str, **changes: Any) -> Structure:
 
 def values_of(structure: Structure) -> np.ndarray:
     """The mechanism's own reference and start, under a base that moves; U_max low enough to limit now and then."""
-    loop = kernel(structure, False, KernelOptions(engine="casadi"))
+    loop = kernel(KernelSpec(structure, options=KernelOptions(engine="casadi")))
     arm = MECHANISMS[structure.mechanism]
     given = {"base_motion.shake.0.amplitude": 0.1, "base_motion.shake.0.omega": 9.0,
              "base_motion.pitch.0.amplitude": 0.05, "base_motion.pitch.0.omega": 3.0}  # fmt: skip
@@ -74,7 +74,7 @@ def values_of(structure: Structure) -> np.ndarray:
 
 
 def rows_of(structure: Structure, sampled: bool, every: int = HOLD, **options: Any) -> np.ndarray:
-    loop = kernel(structure, sampled, KernelOptions(**options))
+    loop = kernel(KernelSpec(structure, sampled, options=KernelOptions(**options)))
     settings = LoopSettings(STEPS, STEP, hold=HOLD, output_every=every)
     runs = loop.run(values_of(structure)[None], settings)
     assert runs.status[0] == 0

@@ -380,7 +380,7 @@ def test_the_kernels_hash_is_of_what_the_compiler_sees(
     def identity(**edited: str) -> str:
         monkeypatch.setattr(work, "runtime_sources", lambda: sources | edited)
         monkeypatch.setattr(work, "_runtime_tokens", runtime_tokens)
-        return str(work._emitted.__wrapped__(own.structure, own.sampled, own.tunable, own.baked)[0])
+        return str(work._emitted.__wrapped__(own.spec)[0])
 
     runtime_tokens = work._runtime_tokens.__wrapped__
     loop = sources["loop.c"]

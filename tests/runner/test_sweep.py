@@ -175,14 +175,14 @@ def test_tied_keys_move_together(write: Write) -> None:
 
 def test_only_what_varies_is_tunable(write: Write) -> None:
     work = plan_of(write(VARIED)).groups[0].work
-    assert set(work.tunable) == {
+    assert set(work.spec.tunable) == {
         "plant.m3", "plant.J", "control.delta", "control.a_max.0", "control.a_max.1", "control.k1", "control.k2"
     }  # fmt: skip
 
 
 def test_a_nominal_parameter_moves_the_plant_with_it(write: Write) -> None:
     work = plan_of(write("mechanism.m3 = { uniform = [30, 50] }")).groups[0].work
-    assert set(work.tunable) == {"mechanism.m3", "plant.m3"}
+    assert set(work.spec.tunable) == {"mechanism.m3", "plant.m3"}
 
 
 def test_scenario_of_a_run_has_the_numbers_of_its_row(write: Write) -> None:
