@@ -22,8 +22,8 @@ class UnexpectedCode(RuntimeError):
     """CasADi's C does not look as this file knows it: its version has to be looked at."""
 
 
-def literal(value: float) -> str:
-    """The C literal of a double with 17 significant digits."""
+def _constant(value: float) -> str:
+    """A double as CasADi prints its own, so that a baked number reads like any other of its file."""
     if value in (float("inf"), float("-inf")):
         return "SL_INF" if value > 0 else "-SL_INF"
     return f"{value:.16e}"
@@ -62,7 +62,7 @@ def print_baked(
     """
     split = [split_parameters(function, name, tunable) for name, function in functions]
     text = print_functions(split, stem, includes=includes, integer="long long int")
-    numbers = [literal(value) for i, value in enumerate(values) if i not in set(tunable)]
+    numbers = [_constant(value) for i, value in enumerate(values) if i not in set(tunable)]
     if not numbers:
         return text
     for function in split:

@@ -13,7 +13,7 @@ from importlib import resources
 from importlib.metadata import version
 
 from springline.codegen.export import Export, comment, provenance
-from springline.codegen.scalar import literal
+from springline.codegen.literals import literal
 from springline.codegen.tables import print_tables
 from springline.codegen.typed import STATUS, TypedInterface
 from springline.codegen.vectors import TIME_STEP, control_outputs

@@ -10,9 +10,10 @@ from springline.codegen.export import Export, comment, provenance
 from springline.codegen.export_text import text_files
 from springline.codegen.fmu_settings import FmiVersion, Settings
 from springline.codegen.fmu_variables import NO_LIMIT, Interface, Variable, base_is_input
+from springline.codegen.literals import constant_expression
 from springline.codegen.names import check_files
 from springline.codegen.stepping import scalar_slopes, scalar_stages
-from springline.codegen.typed import TypedInterface, literal_constant
+from springline.codegen.typed import TypedInterface
 
 _HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
@@ -87,7 +88,7 @@ def _model(
         '#include "sl_math.h"',
         "",
         *(
-            f"#define {name} ({literal_constant(value, 'double')}) /* {meaning} */"
+            f"#define {name} ({constant_expression(value)}) /* {meaning} */"
             for name, value, meaning in (
                 ("FMU_GRID", grid, grid_meaning),
                 ("FMU_BOUND", settings.bound, "the plant may not leave it, SI"),
@@ -129,7 +130,7 @@ def _model(
 
 def _row(variable: Variable) -> str:
     bounds = variable.bounds
-    numbers = (literal_constant(x, "double") for x in (variable.start or 0.0, bounds.low, bounds.high))
+    numbers = (constant_expression(x) for x in (variable.start or 0.0, bounds.low, bounds.high))
     flags = (bounds.low_open, bounds.high_open, bounds.even, bounds.infinite)
     return (
         f'{{"{variable.name}", FMU_{variable.causality.upper()}, {int(variable.boolean)}, {int(variable.fixed)}, '

@@ -9,7 +9,6 @@ processor always has something independent to do.
 from __future__ import annotations
 
 import heapq
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from functools import partial
 import casadi as ca
 
 from springline.codegen.graph import Binding, LoopGraph
+from springline.codegen.literals import literal
 from springline.codegen.operations import MASKS, POWERS, SPECIAL_POWERS, formula, print_operation
 from springline.codegen.program import Program
 from springline.model.base import COORDINATES
@@ -68,16 +68,6 @@ class Emission:
     sizes: dict[str, int]
     tunable: tuple[str, ...]
     counts: dict[str, int]
-
-
-def literal(value: float) -> str:
-    """A C literal that reads back as the same double."""
-    if math.isnan(value):
-        return "SL_NAN"
-    if math.isinf(value):
-        return "SL_INF" if value > 0 else "-SL_INF"
-    text = repr(float(value))
-    return text if any(c in text for c in ".e") else text + ".0"
 
 
 class _Emitter:

@@ -7,50 +7,22 @@ lists, which keeps few values alive at a time: on a small processor that is what
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
 
 import casadi as ca
-import numpy as np
 
-from springline.codegen.export import Export, Real, port_entries
+from springline.codegen.export import Export, port_entries
 from springline.codegen.graph import Binding, ValueGraph
+from springline.codegen.literals import Real, literal
 from springline.codegen.operations import MASKS, POWERS, print_operation
 from springline.model.sliding import LARGEST_EXPONENT, TINY
 
 # Guards among the model's constants that a float cannot hold, and what does their duty there: 1e-24**(-4/3), the
 # steepest power on the control's way, and exp(85) times a gain of 20 are still finite.
 _SINGLE = {TINY: 1e-24, LARGEST_EXPONENT: 85.0}
-
-
-def literal(value: float, real: Real) -> str:
-    """The C constant: the same double, or the float nearest to it.
-
-    Raises ValueError for a number other than zero that a float cannot hold.
-    """
-    f = "F" if real == "float" else ""
-    if math.isnan(value):
-        return f"SL{f}_NAN"
-    if math.isinf(value):
-        return f"SL{f}_INF" if value > 0 else f"-SL{f}_INF"
-    if real == "double":
-        return _with_point(repr(value))
-    with np.errstate(over="ignore", under="ignore"):
-        single = np.float32(value)
-    if value != 0.0 and (single == 0.0 or not np.isfinite(single)):
-        raise ValueError(f"{value!r} cannot be a float: export with real = 'double'")
-    return _with_point(np.format_float_scientific(single, trim="-") if _extreme(value) else str(single)) + "f"
-
-
-def _extreme(value: float) -> bool:
-    return value != 0.0 and not 1e-4 <= abs(value) < 1e7
-
-
-def _with_point(text: str) -> str:
-    return text if any(c in text for c in ".e") else text + ".0"
 
 
 class _SinglePrecision:

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from springline.codegen.export import Real
-from springline.codegen.scalar import literal
+from springline.codegen.literals import Real, literal
 from springline.model.integrators import Number, Tableau
 
 Term = tuple[float, int]
@@ -155,7 +154,7 @@ def _kernel_case(tableau: Tableau, stage: int) -> str:
     lines = list(statements(tableau, stage, element=lambda name: f"{name}[i][g]", slope=slope, gain=gain))
     return "\n".join(
         [
-            *(f"      const sl_v {name} = slv_set({factor!r} * h);" for factor, name in gains.items()),
+            *(f"      const sl_v {name} = slv_set({literal(factor)} * h);" for factor, name in gains.items()),
             "      for (i = 0; i < SL_NX; i++) {",
             "        for (g = 0; g < SL_G; g++) {",
             *(f"          {line}" for line in lines),

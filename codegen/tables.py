@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from springline.codegen.literals import literal
 from springline.codegen.numbers import real
 
 Floats = NDArray[np.float64]
@@ -40,10 +41,11 @@ def print_tables(tables: Sequence[Table], name: str) -> Iterator[str]:
     for i, table in enumerate(tables):
         intervals, channels, _ = table.coefficients.shape
         yield f"static const double {name}_{i}[] = {{"
-        yield from (f"  {', '.join(repr(float(c)) for c in interval.ravel())}," for interval in table.coefficients)
+        yield from (f"  {', '.join(literal(c) for c in interval.ravel())}," for interval in table.coefficients)
         yield "};"
         yield ""
-        rows.append(f"  {{{table.t0!r}, {table.dt!r}, {intervals}, {channels}, {int(table.periodic)}, {name}_{i}}},")
+        start, step = literal(table.t0), literal(table.dt)
+        rows.append(f"  {{{start}, {step}, {intervals}, {channels}, {int(table.periodic)}, {name}_{i}}},")
     yield f"static const sl_table {name}[{len(tables)}] = {{"
     yield from rows
     yield "};"

@@ -6,8 +6,9 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from springline.codegen.export import Export, Real, port_entries
-from springline.codegen.scalar import Body, ScalarPrinter, literal
+from springline.codegen.export import Export, port_entries
+from springline.codegen.literals import Real, constant_expression, literal
+from springline.codegen.scalar import Body, ScalarPrinter
 from springline.codegen.stepping import scalar_slopes, scalar_stages
 from springline.model.parameters import Bounds
 from springline.model.quantities import A_LIMITED, BASE, REFERENCE, SATURATED, SIGMA, E, Quantity, U, entries
@@ -188,7 +189,7 @@ class TypedInterface:
         given = "const springline_parameters *parameters, " if tunable else ""
         signature = f"static void springline_derive({given}springline_real *derived) {{\n"
         argument = "&config->parameters, " if tunable else ""
-        defaults = ", ".join(literal_constant(export.values[i], real) for i in export.tunable)
+        defaults = ", ".join(constant_expression(export.values[i], real) for i in export.tunable)
         blocks |= {
             "parameter_struct": self._parameter_struct(),
             "config_parameters": "  springline_parameters parameters;\n" if tunable else "",
@@ -296,13 +297,6 @@ class TypedInterface:
             return ""
         noun = "tables are" if len(tables) > 1 else "table is"
         return f"The scenario's {' and '.join(tables)} {noun} not part of the export: zero here."
-
-
-def literal_constant(value: float, real: Real) -> str:
-    """As `literal`, for initialisers of static data, where C wants a constant expression."""
-    if math.isinf(value):
-        return f"{literal(math.copysign(1.0, value), real)} / {literal(0.0, real)}"
-    return literal(value, real)
 
 
 def bounds_tests(expression: str, bounds: Bounds, real: Real) -> list[str]:
