@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -14,16 +13,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from springline.codegen.literals import Real
 from springline.codegen.manifest import canonical_json
 from springline.codegen.names import check_prefix
+from springline.codegen.nearest import nearest
 from springline.codegen.program import count_operations
 from springline.codegen.tables import Table
 from springline.model.parameters import Slot
 from springline.model.quantities import BASE, DDQ1, DERIVATIVES, REFERENCE, SIGMA, E, Quantity, T, entries
 from springline.model.sliding import LAWS
 from springline.model.system import Structure, System
-
-Real = Literal["double", "float"]
 
 MODEL_FUNCTIONS = (
     "mass_matrix",
@@ -213,11 +212,10 @@ def _tunable(slots: Sequence[Slot], names: Sequence[str] | str) -> tuple[int, ..
     for name in names:
         found = {i for i, slot in enumerate(slots) if f"{slot.key}.".startswith(f"{name}.")}
         if not found:
-            keys = [slot.key for slot in slots]
-            near = difflib.get_close_matches(name, keys, 1, 0.0)
             if name in _STRUCTURE:
                 raise ValueError(f"{name!r} is structure and never tunable: export once for each of its values")
-            raise ValueError(f"no parameter {name!r}; the nearest name is {near[0]!r}")
+            near = nearest(name, (slot.key for slot in slots), 0.0)
+            raise ValueError(f"no parameter {name!r}; the nearest name is {near!r}")
         chosen |= found
     return tuple(sorted(chosen))
 

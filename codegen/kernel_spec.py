@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Literal, get_args
 
+from springline.codegen.nearest import nearest
 from springline.codegen.numbers import real, whole
 from springline.codegen.toolchain import Compiler
 from springline.model.system import Structure, System
@@ -82,7 +83,8 @@ class KernelSpec:
                 raise ValueError("the casadi engine bakes no parameter: expected tunable = None")
             for key in self.tunable:
                 if key not in keys:
-                    raise ValueError(f"tunable has {key!r}, which is no parameter of this structure")
+                    near = nearest(key, keys, 0.0)
+                    raise ValueError(f"no parameter {key!r} to be tunable; the nearest name is {near!r}")
             if len(self.baked) != len(keys):
                 raise ValueError(f"baked has {len(self.baked)} values, expected {len(keys)}, one a parameter")
             numbers = (real(f"baked {key}", value, infinite=True) for key, value in zip(keys, self.baked, strict=True))

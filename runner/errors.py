@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
+
+from springline.codegen.nearest import nearest
 
 # Longer values and lists of names would bury the message.
 _LONGEST_VALUE = 60
@@ -33,9 +34,7 @@ class Problem:
     @property
     def nearest(self) -> str:
         """The valid name that is most like the mistaken one, or ""."""
-        by_case = {name.casefold(): name for name in self.valid}
-        close = get_close_matches(self.name.casefold(), by_case, n=1, cutoff=0.5)
-        return by_case[close[0]] if close else ""
+        return nearest(self.name, self.valid)
 
     def __str__(self) -> str:
         text = ": ".join(part for part in (self.where, self.key, self.expected) if part)

@@ -30,10 +30,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
+from springline.codegen.nearest import nearest
 from springline.codegen.numbers import double
 from springline.runner.errors import InputError, Problem, unknown
 from springline.runner.locate import expect_kind, packaged_sweeps, scenarios_folder
@@ -420,7 +420,7 @@ def _says_how(table: Mapping[str, Any]) -> bool:
     """Whether a table is how a key varies, and not one of further keys; a misspelt word is still a word."""
     words = (*_KINDS, *_OPTIONS)
     return any(
-        name in words or (not isinstance(content, dict) and get_close_matches(name, words, n=1, cutoff=0.7))
+        name in words or (not isinstance(content, dict) and nearest(name, words, 0.7))
         for name, content in table.items()
     )
 

@@ -67,7 +67,7 @@ def test_a_spec_travels_to_another_process() -> None:
     ({"baked": BAKED[1:]}, f"baked has {len(BAKED) - 1} values, expected {len(BAKED)}"),
     ({"baked": ()}, f"baked has 0 values, expected {len(BAKED)}"),
     ({"baked": baked_with(plant_m3=float("nan"))}, r"baked plant\.m3 is nan"),
-    ({"tunable": ("control.dleta",)}, r"'control\.dleta', which is no parameter"),
+    ({"tunable": ("control.dleta",)}, r"no parameter 'control\.dleta' .* nearest name is 'control\.delta'"),
     ({"options": KernelOptions(engine="casadi")}, "the casadi engine bakes no parameter"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_refused(change: dict[str, Any], message: str) -> None:
