@@ -74,11 +74,11 @@ class KernelSpec:
     _constant_bits: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        keys = _slot_keys(self.structure)
         if self.tunable is None:
             if self.baked:
                 raise ValueError(f"baked has {len(self.baked)} values, expected none where every parameter is tunable")
-        else:
+        else:  # only here, for a system is symbolic work, which threads that run kernels must not do
+            keys = _slot_keys(self.structure)
             if self.options.engine == "casadi":
                 raise ValueError("the casadi engine bakes no parameter: expected tunable = None")
             for key in self.tunable:

@@ -5,16 +5,14 @@ it is still as the manifest says, so nobody's work is ever overwritten unasked. 
 folder belongs to (that of generated C has none), and no other command touches what it lists.
 """
 
-import contextlib
 import hashlib
 import json
 import math
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, NamedTuple
 
-from springline.codegen.unfinished import remove_leftovers, workplace
+from springline.codegen.atomic import change_folder, remove_leftovers
 
 MANIFEST = "manifest.json"
 
@@ -80,7 +78,7 @@ def write_tree(
     _refuse_conflicts(folder, new, removals, listed, force=force)
     writes = [path for path, content in new.items() if _content(folder, path) != content]
     if writes or removals:
-        _replace(folder, {path: new[path] for path in writes}, removals)
+        change_folder(folder, {path: new[path] for path in writes}, removals)
     else:
         remove_leftovers(folder)
     return Changes(tuple(writes), tuple(removals))
@@ -218,57 +216,6 @@ def _stays_inside(path: str) -> bool:
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-# --- replacing -------------------------------------------------------------------------------------------
-
-
-def _replace(folder: Path, writes: Mapping[str, bytes], removals: Sequence[str]) -> None:
-    """Move new files in and old ones out, or leave all as it was. The manifest, last in `writes`, comes last.
-
-    A process killed half-way leaves files that are old or new as a whole; the next write accepts both.
-    """
-    folder = folder.resolve()
-    with contextlib.ExitStack() as above:
-        for place in (*reversed(folder.parents), folder):
-            _make_folder(place, above)
-        # Inside the folder, for only there is it surely the same file system (the folder may be a mount).
-        with workplace(folder) as work, contextlib.ExitStack() as undo:
-            prepared, replaced = work / "new", work / "old"
-            for path, content in writes.items():
-                (prepared / path).parent.mkdir(parents=True, exist_ok=True)
-                with (prepared / path).open("wb") as stream:
-                    stream.write(content)
-                    stream.flush()
-                    os.fsync(stream.fileno())
-            for path in (*removals, *writes):
-                target, old = folder / path, replaced / path
-                for inner in reversed(PurePosixPath(path).parents):
-                    _make_folder(folder / inner, undo)
-                if target.exists():
-                    old.parent.mkdir(parents=True, exist_ok=True)
-                    os.replace(target, old)
-                    undo.callback(os.replace, old, target)
-                if path in writes:
-                    os.replace(prepared / path, target)
-                    undo.callback(target.unlink)
-            undo.pop_all()
-        above.pop_all()
-    _remove_empty_folders(folder, removals)
-
-
-def _make_folder(place: Path, undo: contextlib.ExitStack) -> None:
-    if not place.is_dir():
-        place.mkdir()
-        undo.callback(place.rmdir)
-
-
-def _remove_empty_folders(folder: Path, removals: Sequence[str]) -> None:
-    for path in removals:
-        for inner in PurePosixPath(path).parents[:-1]:
-            place = folder / inner
-            if place.is_dir() and not any(place.iterdir()):
-                place.rmdir()
 
 
 # --- words -----------------------------------------------------------------------------------------------

@@ -33,14 +33,13 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
+from springline.codegen.atomic import TEMPORARY, write_file
 from springline.codegen.manifest import canonical_json
-from springline.codegen.unfinished import TEMPORARY
 from springline.runner.errors import InputError, Problem, unknown
 from springline.runner.plan import FORMAT, Chunk, Plan
 from springline.runner.records import FOLDER as TABLES
 from springline.runner.seal import Opened, Seal
 from springline.runner.simulate import trajectory_schema
-from springline.runner.storage import write_file
 from springline.runner.toml_text import read_toml, value_text
 
 DESCRIPTION = "sweep.json"

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from springline.codegen.atomic import TEMPORARY
 from springline.codegen.manifest import MANIFEST, Changes, FolderConflict, canonical_json, read_manifest, write_tree
-from springline.codegen.unfinished import TEMPORARY
 from springline.runner.claims import Finding, judge
 from springline.runner.paper_cases import GROUPS
 from springline.runner.paper_claims import CLAIMS

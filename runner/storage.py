@@ -10,10 +10,8 @@ The same table gives the same bytes: no time of writing, no host, no user is rec
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Literal
@@ -21,7 +19,7 @@ from typing import Literal
 import pyarrow as pa
 from pyarrow import csv, parquet
 
-from springline.codegen.unfinished import temporary, workplace
+from springline.codegen.atomic import change_folder
 
 Format = Literal["parquet", "csv"]
 
@@ -72,70 +70,18 @@ def read_table(path: Path) -> pa.Table:
     return table.cast(pa.schema(fields))
 
 
-def write_file(path: Path, content: bytes) -> None:
-    """Write one file whole or not at all: under a temporary name beside it, to the disk, then into place.
-
-    The folder must exist. A process that is killed on the way leaves what was there before, and perhaps a file
-    whose name begins with `TEMPORARY`. Raises OSError if the disk refuses.
-    """
-    unfinished = temporary(path.parent)
-    try:
-        _write_through(unfinished, content)
-        os.replace(unfinished, path)
-    except BaseException:
-        unfinished.unlink(missing_ok=True)
-        raise
-    _sync(path.parent)
-
-
 def write_folder(folder: Path, files: Mapping[str, bytes], replaces: Iterable[str] = ()) -> None:
-    """Write a folder of results: everything is on the disk before the first file is seen.
+    """Write a folder of results, whole or not at all.
 
     files     path inside the folder (``/`` between parts) -> content
     replaces  glob patterns, inside the folder, of earlier results that go when the new ones come
 
-    A folder that does not exist comes into being complete, in one rename. In one that does, files of the same name
-    are replaced, one rename each; others stay where they are. Raises OSError if the disk refuses; then a new
-    folder is not there, and an existing one is as it was.
+    Files of the same name are replaced, others stay where they are. Raises OSError if the disk refuses; then all is as
+    it was, and a new folder is not there.
     """
-    fresh = not folder.exists()
-    within = folder.parent if fresh else folder
-    within.mkdir(parents=True, exist_ok=True)
-    with workplace(within) as staging:
-        for name, content in files.items():
-            (staging / name).parent.mkdir(parents=True, exist_ok=True)
-            _write_through(staging / name, content)
-        if fresh:
-            os.rename(staging, folder)
-        else:
-            for name in files:
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                os.replace(staging / name, folder / name)
-    new = {folder / name for name in files}
-    for old in {path for pattern in replaces for path in folder.glob(pattern)} - new:
-        old.unlink()
-        if old.parent != folder and not any(old.parent.iterdir()):
-            old.parent.rmdir()
-    _sync(folder)
-    _sync(folder.parent)
+    earlier = {path.relative_to(folder).as_posix() for pattern in replaces for path in folder.glob(pattern)}
+    change_folder(folder, files, sorted(earlier - files.keys()))
 
 
 def _json(value: object) -> bytes:
     return (json.dumps(value, indent=2, ensure_ascii=False) + "\n").encode()
-
-
-def _write_through(path: Path, content: bytes) -> None:
-    with path.open("xb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
-
-
-def _sync(folder: Path) -> None:
-    """Make renames in `folder` last through a power cut, where the file system can."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        with contextlib.suppress(OSError):  # some network file systems sync no folder
-            os.fsync(handle)
-    finally:
-        os.close(handle)

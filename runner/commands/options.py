@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from springline.codegen.unfinished import TEMPORARY
+from springline.codegen.atomic import TEMPORARY
 from springline.runner.errors import InputError, Problem
 
 ScenarioName = Annotated[str, typer.Argument(help="A TOML file, or the name of a packaged scenario.")]

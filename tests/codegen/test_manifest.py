@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from springline.codegen.atomic import workplace
 from springline.codegen.manifest import (
     Changes,
     FolderConflict,
@@ -25,7 +26,6 @@ from springline.codegen.manifest import (
     summary,
     write_tree,
 )
-from springline.codegen.unfinished import workplace
 
 OLD = {"include/a.h": b"int a;\n", "src/a.c": b"int a = 1;\n", "src/gone/b.c": b"int b;\n"}
 NEW = {"include/a.h": b"int a;\n", "src/a.c": b"int a = 2;\n", "README.md": b"# a\n"}
@@ -326,14 +326,25 @@ def test_a_file_cannot_be_a_folder_too(tmp_path: Path) -> None:
 # --- all or nothing --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("fresh", [False, True])
+def without_links(*_: object, **__: object) -> None:
+    raise OSError("Operation not permitted")
+
+
+# Update: two files and the manifest in, one out; where there are no hard links, two of the three give way first.
+@pytest.mark.parametrize(
+    ("fresh", "links", "moves"),
+    [(True, True, 1), (False, True, 4), (False, False, 6)],
+    ids=["new folder", "update", "update without links"],
+)
 @pytest.mark.parametrize("error", [OSError("disk full"), KeyboardInterrupt()])
 def test_failure_at_any_move_restores_everything(
-    fresh: bool, error: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fresh: bool, links: bool, moves: int, error: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place = tmp_path / "deep" / "out"
     if not fresh:
         write_tree(place, OLD, OLD_INFO)
+    if not links:
+        monkeypatch.setattr(os, "link", without_links)
     before = contents(tmp_path)
     real = os.replace
     calls = 0
@@ -357,8 +368,7 @@ def test_failure_at_any_move_restores_everything(
             assert contents(tmp_path) == before
         else:
             break
-    # new: README.md, include/a.h, src/a.c, manifest. Update: two files and the manifest in; two and one out.
-    assert failures == (4 if fresh else 6)
+    assert failures == moves
     assert check_tree(place, NEW, NEW_INFO) == []
 
 

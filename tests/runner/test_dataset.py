@@ -22,10 +22,10 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from springline.codegen import lanes
+from springline.codegen import atomic, lanes
+from springline.codegen.atomic import TEMPORARY
 from springline.codegen.kernel_source import runtime_sources
-from springline.codegen.unfinished import TEMPORARY
-from springline.runner import storage, work
+from springline.runner import work
 from springline.runner.batch import open_pool, run_sweep, versions
 from springline.runner.commands.batch import batch, replay
 from springline.runner.dataset import Dataset, changes, place, read_dataset
@@ -618,7 +618,7 @@ def test_a_full_disk_is_told_and_what_is_there_stays_sound(
 ) -> None:
     """With a disk that has room for three parts; the real thing is the next test."""
     monkeypatch.setattr(import_module("springline.runner.batch"), "_PAUSE", 0.0)
-    genuine, room = storage._write_through, [3]
+    genuine, room = atomic._write_through, [3]
 
     def full(path: Path, data: bytes) -> None:
         if room[0] == 0 and path.name.startswith(TEMPORARY):
@@ -627,12 +627,12 @@ def test_a_full_disk_is_told_and_what_is_there_stays_sound(
         room[0] -= data[:4] == b"PAR1"
         genuine(path, data)
 
-    monkeypatch.setattr(storage, "_write_through", full)
+    monkeypatch.setattr(atomic, "_write_through", full)
     tally = run(write(), tmp_path / "data")
     assert (tally.done, tally.failed) == (96, 96)
     assert "No space left on device" in tally.failures[0]
     assert sorted(content(tmp_path / "data")) == [*(f"part-{k:06d}.parquet" for k in range(3)), "sweep.json"]
-    monkeypatch.setattr(storage, "_write_through", genuine)
+    monkeypatch.setattr(atomic, "_write_through", genuine)
     assert run(write(), tmp_path / "data", resume=True).done == 204
     run(write(), tmp_path / "other")
     assert content(tmp_path / "data") == content(tmp_path / "other")

@@ -14,9 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from springline.codegen.atomic import write_file
 from springline.runner import storage
 from springline.runner.simulate import field
-from springline.runner.storage import read_table, table_files, units, write_file, write_folder
+from springline.runner.storage import read_table, table_files, units, write_folder
 
 SCHEMA = pa.schema([field("t", "s"), field("force", "N m"), field("status", "", pa.string())])
 TABLE = pa.table(
@@ -79,7 +80,7 @@ def names(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-def disk_full(*_: object) -> None:
+def disk_full(*_: object, **__: object) -> None:
     raise OSError(28, "No space left on device")
 
 
@@ -146,6 +147,56 @@ def test_write_folder_that_fails_leaves_an_old_folder_as_it_was(
         write_folder(tmp_path, {"a.txt": b"new", "b.txt": b"new"}, replaces=["*.txt"])
     assert names(tmp_path) == ["a.txt", "b.txt"]
     assert (tmp_path / "a.txt").read_bytes() == b"old"
+
+
+def test_write_folder_that_fails_at_any_move_leaves_all_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = {"a.txt": b"old", "b.txt": b"old", "figures/x.png": b"old", "mine.md": b"mine"}
+    write_folder(tmp_path, old)
+    real, left = os.replace, [0]
+
+    def full_at_some_move(source: Path, target: Path) -> None:
+        left[0] -= 1
+        if left[0] == 0:
+            disk_full()
+        real(source, target)
+
+    monkeypatch.setattr(os, "replace", full_at_some_move)
+    for move in range(1, 5):  # the picture out, two files in, one of them new
+        left[0] = move
+        if move < 4:
+            with pytest.raises(OSError, match="No space"):
+                write_folder(tmp_path, {"a.txt": b"new", "c.txt": b"new"}, replaces=["figures/*.png"])
+            assert {name: (tmp_path / name).read_bytes() for name in names(tmp_path)} == old
+        else:
+            write_folder(tmp_path, {"a.txt": b"new", "c.txt": b"new"}, replaces=["figures/*.png"])
+    assert names(tmp_path) == ["a.txt", "b.txt", "c.txt", "mine.md"]
+
+
+def test_a_file_is_there_all_the_time_while_it_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_folder(tmp_path, {"a.txt": b"old"})
+    real, seen = os.replace, []
+
+    def watched(source: Path, target: Path) -> None:
+        seen.append((tmp_path / "a.txt").read_bytes())
+        real(source, target)
+
+    monkeypatch.setattr(os, "replace", watched)
+    write_folder(tmp_path, {"a.txt": b"new"})
+    assert seen == [b"old"]
+    assert (tmp_path / "a.txt").read_bytes() == b"new"
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_folder_in_the_place_of_a_file_stays(links: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not links:
+        monkeypatch.setattr(os, "link", disk_full)
+    write_folder(tmp_path, {"a.txt/mine.md": b"mine", "z.txt": b"old"})
+    with pytest.raises(IsADirectoryError, match=r"a\.txt"):
+        write_folder(tmp_path, {"z.txt": b"new", "a.txt": b"new"})
+    assert names(tmp_path) == ["a.txt/mine.md", "z.txt"]
+    assert (tmp_path / "z.txt").read_bytes() == b"old"
 
 
 def killed_while_renaming(folder: Path) -> None:
