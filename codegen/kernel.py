@@ -27,7 +27,6 @@ __all__ = [
     "MOST_STEPS",
     "ONE_RUN",
     "STATUS",
-    "Control",
     "Engine",
     "Kernel",
     "KernelOptions",
@@ -36,6 +35,7 @@ __all__ = [
     "LoopSettings",
     "Runs",
     "Table",
+    "Watch",
     "chatters",
     "compile_kernel",
     "joined",
@@ -133,8 +133,8 @@ def joined(parts: Sequence[Runs]) -> Runs:
 
 
 @dataclass
-class Control:
-    """Shared with a running call from another thread: `progress` counts steps x runs, setting `stop` ends it early."""
+class Watch:
+    """Shared with running calls from another thread: `progress` counts steps x runs, setting `stop` ends them early."""
 
     progress: ctypes.c_int64 = field(default_factory=ctypes.c_int64)
     stop: ctypes.c_int32 = field(default_factory=ctypes.c_int32)
@@ -245,7 +245,7 @@ class Kernel:
         settings: LoopSettings,
         tables: Sequence[Table] = (),
         *,
-        control: Control | None = None,
+        watch: Watch | None = None,
     ) -> Runs:
         """Simulate one run per row of `parameters` (runs, len(self.parameters)), in this thread, without the GIL.
 
@@ -314,8 +314,8 @@ class Kernel:
             trajectory=result.trajectory.ctypes.data if result.trajectory is not None else None,
             rows=result.rows.ctypes.data if result.rows is not None else None,
             capacity=rows,
-            progress=ctypes.addressof(control.progress) if control else None,
-            stop=ctypes.addressof(control.stop) if control else None,
+            progress=ctypes.addressof(watch.progress) if watch else None,
+            stop=ctypes.addressof(watch.stop) if watch else None,
         )
         self._simulate(ctypes.byref(job))
         return result

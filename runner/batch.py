@@ -15,7 +15,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, field, replace
 from importlib import import_module, metadata
 from typing import Any, Protocol
@@ -24,9 +24,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
-from springline.codegen.kernel import Control, Runs, joined
+from springline.codegen.kernel import Runs, joined
 from springline.codegen.memory import memory
 from springline.codegen.toolchain import ToolchainError
+from springline.runner.crew import REFRESH, Crew, results
 from springline.runner.dataset import Dataset, Place
 from springline.runner.dotted import expect_keys
 from springline.runner.errors import InputError, Problem
@@ -42,7 +43,6 @@ Floats = NDArray[np.float64]
 _ATTEMPTS = 3
 _IN_A_ROW = 3
 _PAUSE = 0.5
-_REFRESH = 0.2
 _ANSWER = "10s"  # for a scheduler to answer
 _CALIBRATION_STEPS = 2000
 _TIMED = 3
@@ -75,29 +75,12 @@ class Pool(Protocol):
         ...
 
 
-class Threads:
-    """Threads of this process: the loop holds no lock and shares nothing."""
-
-    def __init__(self, jobs: int) -> None:
-        self.threads = jobs
-        self._executor = ThreadPoolExecutor(jobs, thread_name_prefix="springline")
-        self._control = Control()
+class Threads(Crew):
+    """Threads of this process."""
 
     def submit(self, work: Work, parameters: Floats, kept: Sequence[int]) -> Future[Outcome]:
         """Begin a chunk in a free thread."""
-        return self._executor.submit(self._perform, work, parameters, kept)
-
-    def _perform(self, work: Work, parameters: Floats, kept: Sequence[int]) -> Outcome:
-        return perform(work.kernel(), work.settings, work.tables, parameters, kept, self._control)
-
-    def underway(self) -> int:
-        """Steps times runs, a few thousand steps behind."""
-        return int(self._control.progress.value)
-
-    def stop(self) -> None:
-        """Chunks under way end within some thousand steps; their results count for nothing."""
-        self._control.stop.value = 1
-        self._executor.shutdown(wait=True, cancel_futures=True)
+        return self.begin(lambda watch: perform(work.kernel(), work.settings, work.tables, parameters, kept, watch))
 
 
 class Cluster:
@@ -139,11 +122,8 @@ def open_pool(jobs: int | None = None, scheduler: str = "") -> Iterator[Pool]:
     Raises InputError if the address is none or nobody answers there.
     """
     if not scheduler:
-        threads = Threads(jobs or processors())
-        try:
+        with Threads(jobs or processors()) as threads:
             yield threads
-        finally:
-            threads.stop()
         return
     with contextlib.ExitStack() as stack:
         cluster = Cluster(_client(scheduler, stack))
@@ -251,7 +231,7 @@ def run_sweep(
             submit(chunk, plan.columns(chunk), 1)
         if not pending:
             break
-        ended, _ = wait(pending, timeout=_REFRESH, return_when=FIRST_COMPLETED)
+        ended, _ = wait(pending, timeout=REFRESH, return_when=FIRST_COMPLETED)
         for future in sorted(ended, key=lambda item: pending[item][0].number):
             chunk, columns, attempt = pending.pop(future)
             try:
@@ -426,4 +406,4 @@ def _over_threads(work: Work, parameters: Floats, jobs: int | None) -> Runs:
         packs = -(-len(parameters) // width)
         size = width * max(1, packs // (_CHUNKS_PER_THREAD * pool.threads))
         futures = [pool.submit(work, parameters[i : i + size], ()) for i in range(0, len(parameters), size)]
-        return joined([future.result().runs for future in futures])
+        return joined([outcome.runs for outcome in results(futures)])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from os import cpu_count
 from threading import Lock
 from typing import Any
@@ -13,12 +13,13 @@ import casadi as ca
 import numpy as np
 import pyarrow as pa
 
-from springline.codegen.kernel import ONE_RUN, KernelSpec, LoopSettings, kernel
+from springline.codegen.kernel import ONE_RUN, KernelSpec, LoopSettings, Watch, kernel
 from springline.codegen.program import program
 from springline.model import theory
 from springline.model.sliding import SurfaceExponents
 from springline.model.system import Structure, System
 from springline.runner.claims import Evidence, Theory
+from springline.runner.crew import Crew, results
 from springline.runner.errors import InputError, Problem
 from springline.runner.measured import Floats, Measured
 from springline.runner.paper_cases import LAWS, cases
@@ -197,9 +198,11 @@ def _run_all(scenarios: Mapping[Key, Scenario], progress: Progress | None) -> di
     done: dict[Key, Measured] = {}
     guard, finished = Lock(), 0
 
-    def work(runs: Iterable[list[Key]]) -> None:
+    def work(runs: Iterable[list[Key]], watch: Watch) -> None:
         nonlocal finished
         for keys in runs:
+            if watch.stop.value:
+                return
             scenario = scenarios[keys[0]]
             result = _linear(scenario) if keys[0][0] == "linear" else simulate(scenario)
             with guard:  # CasADi again
@@ -208,16 +211,13 @@ def _run_all(scenarios: Mapping[Key, Scenario], progress: Progress | None) -> di
                     run = with_velocities(scenario, run)
                 done.update((key, run) for key in keys)
                 finished += 1
-                if progress is not None:
-                    progress(finished / total)
 
-    with ThreadPoolExecutor(cpu_count() or 1) as pool:
-        try:
-            for future in [pool.submit(work, list(runs.values())) for runs in jobs.values()]:
-                future.result()
-        except BaseException:  # Ctrl-C above all: what has not begun need not
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    def report() -> None:
+        if progress is not None:
+            progress(finished / total)
+
+    with Crew(cpu_count() or 1) as crew:
+        results([crew.begin(partial(work, list(runs.values()))) for runs in jobs.values()], report)
     return done
 
 

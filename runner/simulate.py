@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from threading import Thread
 
 import numpy as np
 import pyarrow as pa
@@ -15,13 +14,10 @@ from springline.codegen.kernel import (
     METRICS,
     ONE_RUN,
     STATUS,
-    Control,
     Engine,
-    Kernel,
     KernelSpec,
     LoopSettings,
     Runs,
-    Table,
     chatters,
     kernel,
     quantity_name,
@@ -29,6 +25,7 @@ from springline.codegen.kernel import (
 from springline.codegen.memory import memory
 from springline.model.parameters import Joint
 from springline.model.system import System
+from springline.runner.crew import Crew, results
 from springline.runner.errors import InputError, Problem
 from springline.runner.scenario import Scenario, expect_scenario
 from springline.runner.tables import kernel_tables
@@ -135,7 +132,14 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     loop = kernel(KernelSpec(scenario.structure(), scenario.control_every > 0, options=options))
     settings = loop_settings(scenario, trajectory=True)
     tables = kernel_tables(scenario.tables())
-    runs = _watched(loop, scenario.values()[None, :], settings, tables, progress)
+    values = scenario.values()[None, :]
+
+    def report() -> None:
+        if progress is not None:
+            progress(crew.underway() / settings.steps)
+
+    with Crew(1) as crew:  # a thread of its own, so that Ctrl-C and a progress bar reach a long run
+        [runs] = results([crew.begin(lambda watch: loop.run(values, settings, tables, watch=watch))], report)
     system = loop.program.system
     assert runs.trajectory is not None and runs.rows is not None
     rows = runs.trajectory[0, : runs.rows[0]]
@@ -165,34 +169,3 @@ def refuse_large(scenario: Scenario) -> None:
     refuse_rows(
         scenario, there // (_COPIES * row_size(scenario)), f"all that {there / 1e9:.3g} GB of memory have room for"
     )
-
-
-def _watched(
-    loop: Kernel, values: Floats, settings: LoopSettings, tables: Sequence[Table], progress: Progress | None
-) -> Runs:
-    """Run in a thread of its own, so that Ctrl-C and a progress bar reach a long run."""
-    control = Control()
-    done: list[Runs] = []
-    failed: list[BaseException] = []
-
-    def work() -> None:
-        try:
-            done.append(loop.run(values, settings, tables, control=control))
-        except BaseException as error:  # carried over to the caller's thread
-            failed.append(error)
-
-    thread = Thread(target=work)
-    thread.start()
-    total = settings.steps * values.shape[0]
-    try:
-        while thread.is_alive():
-            thread.join(0.1)
-            if progress is not None:
-                progress(control.progress.value / total)
-    except KeyboardInterrupt:
-        control.stop.value = 1
-        thread.join()
-        raise
-    if failed:
-        raise failed[0]
-    return done[0]

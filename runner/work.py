@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from springline.codegen import lanes
 from springline.codegen.c_tokens import tokens
 from springline.codegen.kernel import (
-    Control,
     Kernel,
     KernelSpec,
     LoopSettings,
     Runs,
     Table,
+    Watch,
     kernel,
 )
 from springline.codegen.kernel_source import KernelSource, print_kernel, runtime_sources
@@ -118,16 +118,18 @@ def perform(
     tables: Sequence[Table],
     parameters: Floats,
     kept: Sequence[int] = (),
-    control: Control | None = None,
+    watch: Watch | None = None,
 ) -> Outcome:
     """Simulate one run per row of `parameters`, in this thread; those at `kept` with their trajectory.
 
-    A kept run is simulated twice, for a trajectory slows a whole pack down; the bits are the same.
+    A kept run is simulated twice, for a trajectory slows a whole pack down; the bits are the same. `watch` counts the
+    first time and stops either.
     """
-    runs = loop.run(parameters, replace(settings, output_every=0), tables, control=control)
+    runs = loop.run(parameters, replace(settings, output_every=0), tables, watch=watch)
+    again = None if watch is None else Watch(stop=watch.stop)
     trajectories: list[Floats] = []
     for first in range(0, len(kept), loop.width):
-        pack = loop.run(parameters[list(kept[first : first + loop.width])], settings, tables)
+        pack = loop.run(parameters[list(kept[first : first + loop.width])], settings, tables, watch=again)
         assert pack.trajectory is not None and pack.rows is not None
         trajectories += [rows[:count].copy() for rows, count in zip(pack.trajectory, pack.rows, strict=True)]
     return Outcome(runs, tuple(trajectories))

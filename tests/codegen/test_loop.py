@@ -17,7 +17,6 @@ from springline.codegen.kernel import (
     METRICS,
     MOST_STEPS,
     STATUS,
-    Control,
     Kernel,
     KernelOptions,
     KernelSpec,
@@ -25,6 +24,7 @@ from springline.codegen.kernel import (
     LoopSettings,
     Runs,
     Table,
+    Watch,
     compile_kernel,
     quantity_name,
 )
@@ -496,9 +496,9 @@ def test_runs_can_be_watched_and_stopped(packs: int, shaken: Program, values_of:
     kernel = compiled(shaken, options=replace(PLAIN, packs=packs))
     assert kernel.width == packs
     runs = np.tile(values_of(shaken), (2 * packs, 1))
-    control = Control()
-    control.stop.value = 1
-    result = kernel.run(runs, LoopSettings(100_000, 1e-5, output_every=1), control=control)
+    watch = Watch()
+    watch.stop.value = 1
+    result = kernel.run(runs, LoopSettings(100_000, 1e-5, output_every=1), watch=watch)
     assert set(result.status) == {3}
     assert result.trajectory is not None and result.rows is not None
     for end, rows, trajectory in zip(result.end_time, result.rows, result.trajectory, strict=True):
@@ -507,9 +507,9 @@ def test_runs_can_be_watched_and_stopped(packs: int, shaken: Program, values_of:
     short = kernel.run(runs, LoopSettings(round(result.end_time[0] / 1e-5), 1e-5))
     assert result.end_time.tobytes() == short.end_time.tobytes()
     assert result.final_state.tobytes() == short.final_state.tobytes(), "the state is that of the time"
-    control = Control()
-    kernel.run(runs, LoopSettings(10_000, 1e-5), control=control)
-    assert control.progress.value == 2 * packs * 10_000
+    watch = Watch()
+    kernel.run(runs, LoopSettings(10_000, 1e-5), watch=watch)
+    assert watch.progress.value == 2 * packs * 10_000
 
 
 def test_wrong_shapes_are_refused(shaken: Program, values_of: Values) -> None:
