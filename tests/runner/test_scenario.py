@@ -308,7 +308,7 @@ def test_tables_are_found_beside_the_scenario(load, tmp_path: Path) -> None:
         pytest.param("[plant]\nm3 = { factor = 2 }", ["plant.m3.factor", "(valid: scale)"], id="no scale"),
         pytest.param('[plant]\nm3 = "x"', ["plant.m3", "or { scale = a number > 0 }"], id="plant value"),
         pytest.param('[reference]\nkind = "sin"', ["reference.kind", "did you mean 'sine'?"], id="kind"),
-        pytest.param('[reference]\nkind = "none"', ["reference.kind", "sine, table"], id="reference none"),
+        pytest.param('[reference]\nkind = "none"', ["reference.kind", "sine, polynomial, table"], id="reference none"),
         pytest.param("[reference]\nlift = 3", ["reference.lift", "{ offset, terms }", "got 3"], id="no signal"),
         pytest.param(
             "[reference]\nlift = { terms = { omega = 1 } }",
