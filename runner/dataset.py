@@ -162,7 +162,7 @@ class Folder:
 
     def local(self) -> Path:
         """The folder itself."""
-        return self._path.resolve()
+        return Path(os.path.realpath(self._path))  # resolve() breaks on links in a circle
 
     def read(self, name: str) -> bytes:
         """Content of a file."""
