@@ -20,6 +20,7 @@ import os
 import re
 import shutil
 import socket
+import stat
 import tempfile
 import tomllib
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
@@ -166,11 +167,19 @@ class Folder:
 
     def read(self, name: str) -> bytes:
         """Content of a file."""
-        return (self._path / name).read_bytes()
+        return self._regular(name).read_bytes()
 
     def open(self, name: str) -> Any:
         """A file to read from."""
-        return (self._path / name).open("rb")
+        return self._regular(name).open("rb")
+
+    def _regular(self, name: str) -> Path:
+        """The path of a file that ends, as pipes and devices need not. Raises OSError for these."""
+        path = self._path / name
+        mode = path.stat().st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            raise OSError(errno.EINVAL, "a pipe or a device: expected a regular file", str(path))
+        return path
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file, whole or not at all."""
@@ -399,7 +408,8 @@ class Dataset:
                 how = str(error)
             case _:
                 how = "an entry is not what is written there"
-        return InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({how})"))
+        remedy = "bring it back from a copy, or begin the dataset anew with another -o"
+        return InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({how}): {remedy}"))
 
     def expect_format(self, stored: Mapping[str, Any]) -> None:
         """Raise InputError unless the dataset was begun by a version that describes and seals it as this one does."""

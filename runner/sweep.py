@@ -27,6 +27,7 @@ where the other's stands.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -36,7 +37,7 @@ from typing import Any, Literal, cast, get_args
 
 from springline.codegen.doubles import double
 from springline.runner.errors import InputError, Problem, unknown
-from springline.runner.locate import expect_kind, packaged_sweeps, scenarios_folder
+from springline.runner.locate import expect_kind, file_text, packaged_sweeps, reason, scenarios_folder
 from springline.runner.scenario import Scenario, load_scenario
 from springline.runner.schema import given_text
 from springline.runner.toml_text import read_toml, value_text
@@ -173,13 +174,13 @@ def _read(source: str | Path) -> tuple[str, Path]:
         return (folder / f"{name}.toml").read_text("utf-8"), Path(str(folder))
     expect_kind("sweep", source)
     path = Path(source)
-    if not path.is_file():
-        there = sorted(str(path.parent / item.name) for item in path.parent.glob("*.toml"))
-        raise InputError(unknown(name, "", "file or packaged sweep", name, [*packaged_sweeps(), *there]))
     try:
-        return path.read_text("utf-8-sig"), path.resolve().parent
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({error})")) from error
+        return file_text(path), Path(os.path.realpath(path)).parent
+    except (FileNotFoundError, NotADirectoryError) as error:
+        there = sorted(str(path.parent / item.name) for item in path.parent.glob("*.toml"))
+        raise InputError(unknown(name, "", "file or packaged sweep", name, [*packaged_sweeps(), *there])) from error
+    except (OSError, ValueError) as error:  # no UTF-8, and names that no file can have
+        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({reason(error)})")) from error
 
 
 class _Reader:

@@ -61,7 +61,7 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
 
     def command(
         scenario: ScenarioName,
-        part: PartOption,
+        part: PartOption = Part.loop,
         output: Output = Path("fmu"),
         changes: Changes = None,
         name: Name = None,

@@ -482,6 +482,15 @@ def test_what_belongs_to_another_command_is_told(
     assert not Path("results").exists()
 
 
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_a_sweep_that_does_not_end_is_told(kind: str, tmp_path: Path, command: Command) -> None:
+    path = tmp_path / "sweep.toml"
+    os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/zero")
+    done = command("batch", path)
+    assert done.exit_code == 2
+    assert "a pipe or a device: expected a regular file" in done.stderr
+
+
 def test_set_overrides_the_scenario_of_a_sweep(sweep: Path, tmp_path: Path, command: Command) -> None:
     folder, change = tmp_path / "data", ["--set", "simulation.duration=0.001", "--set", 'control.law="power"']
     done = command("batch", sweep, "-o", folder, "--no-plot", *change)

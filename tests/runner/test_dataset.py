@@ -21,12 +21,14 @@ from typing import Any
 import pyarrow as pa
 import pytest
 from pyarrow import parquet
+from typer.testing import CliRunner
 
 from springline.codegen import lanes
 from springline.codegen.kernel_source import runtime_sources
 from springline.codegen.unfinished import TEMPORARY
 from springline.runner import storage, work
 from springline.runner.batch import open_pool, run_sweep, versions
+from springline.runner.cli import app
 from springline.runner.commands.batch import batch, replay
 from springline.runner.dataset import Dataset, changes, place, read_dataset
 from springline.runner.errors import InputError
@@ -678,3 +680,15 @@ def test_a_tmpfs_that_is_full(write: Callable[..., Path], tmp_path: Path, requir
     assert second.startswith("0 ")
     run(sweep, tmp_path / "other")
     assert content(tmp_path / "disk-copy") == content(tmp_path / "other")
+
+
+@pytest.mark.parametrize("name", ["sweep.json", "part-000000.parquet"])
+def test_a_pipe_in_a_dataset_is_not_waited_for(name: str, write: Callable[..., Path], tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    run(write(40), data)
+    (data / name).unlink()
+    os.mkfifo(data / name)
+    words = ["replay", str(data), "0", "-o", str(tmp_path / "run"), "--no-plot"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 2
+    assert "a pipe or a device" in done.stderr

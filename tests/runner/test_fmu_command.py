@@ -80,9 +80,15 @@ def test_scenario_file_name_and_tunable(tmp_path: Path, monkeypatch: pytest.Monk
     assert '<DefaultExperiment startTime="0.0" stopTime="3.0" stepSize="0.0001" />' in text
 
 
+def test_the_part_is_the_loop_unless_another_is_asked_for(tmp_path: Path) -> None:
+    result = springline("export", "fmu2", "paper/nominal", "-o", tmp_path, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["rows"] == [{"path": "nominal_loop_fmi2.fmu", "change": "written"}]
+
+
 def test_wrong_input(tmp_path: Path, folder: Path) -> None:
     export = ("export", "fmu3", "paper/nominal")
-    assert "--part" in refused(*export)
+    assert "--part" in refused(*export, "--part")
     assert "nobody" in refused(*export, "--part", "nobody")
     out = ("--part", "plant", "-o", tmp_path / "out")
     assert "the nearest name is 'control.delta'" in refused(*export, *out, "--tunable", "control.dleta")
