@@ -543,7 +543,23 @@ def read_dataset(destination: str | Path, columns: Sequence[str] | None = None) 
         if table.schema != tables[0].schema:
             text = "has other columns than the first part: springline batch --resume makes what is not whole again"
             raise InputError(Problem(f"{dataset.place.name}/{name}", "", text))
+    if columns is None or "run" in columns:
+        _expect_each_run_once(dataset, tables)
     return pa.concat_tables(tables)
+
+
+def _expect_each_run_once(dataset: Dataset, tables: Sequence[pa.Table]) -> None:
+    """Raise InputError for a part that holds runs that an earlier one has: a copy in another's place, or a surplus."""
+    last = -1
+    for name, table in zip(dataset.parts(), tables, strict=True):
+        runs = table["run"].to_numpy()
+        if len(runs) and (runs[0] <= last or np.any(np.diff(runs) <= 0)):
+            text = (
+                "holds runs that an earlier part has: springline batch --resume makes a part of the sweep again; one "
+                "that is none of its parts is to be removed"
+            )
+            raise InputError(Problem(f"{dataset.place.name}/{name}", "", text))
+        last = int(runs[-1]) if len(runs) else last
 
 
 def _as_written(description: Mapping[str, Any]) -> dict[str, Any]:

@@ -527,7 +527,7 @@ def test_a_sweep_larger_than_memory_or_disk_is_refused_before_it_starts(
     monkeypatch.setattr(Folder, "free", lambda self: 5000)
     done = command("batch", sweep, "-o", tmp_path / "data", "--jobs", 1)
     assert done.exit_code == 2
-    assert re.search(r"data: has 5,000 bytes free, and the dataset takes [\d,]{6,} at least: choose", done.stderr)
+    assert re.search(r"data: has 5,000 bytes free, and the dataset takes about [\d,]{6,}: choose", done.stderr)
     assert not (tmp_path / "data").exists()
     monkeypatch.undo()
     assert command("batch", sweep, "-o", tmp_path / "data", "--jobs", 1, "--no-plot").exit_code == 0
@@ -780,3 +780,11 @@ def test_sizes_and_times_are_for_people() -> None:
         "4.6 days",
     ]
     assert [size_text(b) for b in (12, 34_567, 5.6e9, 7e13)] == ["12 B", "34.6 kB", "5.6 GB", "70 TB"]
+
+
+def test_a_batch_beyond_memory_is_refused_before_it_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = load_scenario("paper/nominal", {"simulation.duration": 0.001})
+    monkeypatch.setattr(importlib.import_module("springline.runner.batch"), "memory", lambda: 100_000)
+    assert len(batch(scenario, {"control.delta": np.full(50, 0.05)}, jobs=1)) == 50
+    with pytest.raises(InputError, match=r"expected fewer runs.*5,000 runs take [\d,]+ bytes, and there are 100"):
+        batch(scenario, {"control.delta": np.full(5000, 0.05)}, jobs=1)

@@ -673,7 +673,7 @@ def test_a_tmpfs_that_is_full(write: Callable[..., Path], tmp_path: Path, requir
     done = subprocess.run(script, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     refused, first, second = done.stdout.splitlines()
-    assert re.match(r"2 Error: .*has [\d,]+ bytes free, and the dataset takes [\d,]+ at least: choose another", refused)
+    assert re.match(r"2 Error: .*has [\d,]+ bytes free, and the dataset takes about [\d,]+: choose another", refused)
     assert first.startswith("1 ")
     assert "No space left on device" in first
     assert "--resume" in first
@@ -692,3 +692,14 @@ def test_a_pipe_in_a_dataset_is_not_waited_for(name: str, write: Callable[..., P
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 2
     assert "a pipe or a device" in done.stderr
+
+
+@pytest.mark.parametrize("twin", [1, 2])
+def test_a_dataset_that_has_a_run_twice_is_not_read(twin: int, write: Callable[..., Path], tmp_path: Path) -> None:
+    """One part copied over another, or besides all others."""
+    data = tmp_path / "data"
+    run(write(64), data)
+    assert len(read_dataset(data)) == 64
+    shutil.copy(data / "part-000000.parquet", data / f"part-00000{twin}.parquet")
+    with pytest.raises(InputError, match=f"part-00000{twin}.parquet: holds runs that an earlier part has"):
+        read_dataset(data)
