@@ -179,6 +179,7 @@ def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
             if interface.missing_tables
             else f"`{export.prefix}_signals` has the scenario's reference and base motion."
         ),
+        "sampling": f"{export.system.mechanism.sampling}\n" if export.system.mechanism.sampling else "",
         "provenance": "  \n".join(provenance(export)),
         "field_table": "\n".join(
             f"| `springline_{name}` | `{field.name}` | {field.unit} |"

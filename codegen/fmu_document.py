@@ -16,10 +16,9 @@ code { font-size: 0.95em; }
 """
 
 _WHAT = {
-    "controller": "The control law of a series-elastic arm on a moving base: references and measurements in, "
-    "motor commands out.",
-    "plant": "A series-elastic arm on a moving base: motor commands in, the state of joints and motors out.",
-    "loop": "A series-elastic arm on a moving base with its controller and its reference: the whole closed loop.",
+    "controller": "The control law of an arm on a moving base: references and measurements in, motor commands out.",
+    "plant": "An arm on a moving base: motor commands in, its state out.",
+    "loop": "An arm on a moving base with its controller and its reference: the whole closed loop.",
 }
 
 
@@ -69,6 +68,8 @@ def document(
             for v in chosen
         ]
         sections.append(f"<h2>{title}</h2>\n{_table(head, rows)}")
+    origin = export.system.mechanism.source
+    cited = f"<p>The model and its equations: {escape(origin)}</p>\n" if origin else ""
     source = "<br>\n".join(escape(line) for line in provenance(export))
     text = f"""<!DOCTYPE html>
 <html lang="en">
@@ -83,8 +84,7 @@ def document(
 <ul>
 {"".join(f"<li>{fact}</li>" + chr(10) for fact in facts)}</ul>
 {chr(10).join(sections)}
-<p>The model and its equations: Guo et al. 2023, Journal of Marine Science and Engineering 11(3) 474.</p>
-<p>{source}</p>
+{cited}<p>{source}</p>
 </body>
 </html>
 """
@@ -104,8 +104,9 @@ def _stepping(export: Export, interface: Interface, settings: Settings) -> list[
             "gives the same result.",
         ]
     facts = [
-        f"The plant is integrated by classical Runge-Kutta steps of {settings.step:g} s, which end at whole multiples "
-        "of it; a communication point in between cuts a step in two. Inputs are held over a communication step."
+        f"The plant is integrated by steps of {settings.step:g} s ({export.system.tableau.title}), which end at whole "
+        "multiples of it; a communication point in between cuts a step in two. Inputs are held over a communication "
+        "step."
     ]
     if interface.part == "loop":
         facts.append(f"The control is {sampled}." if sampled else "The control is continuous: part of every stage.")

@@ -229,7 +229,10 @@ def build_library(
             if not (_intact(entry) and _loads(library)):
                 _build(entry, content, command, compiler)
     except OSError as error:
-        raise ToolchainError(f"cannot use the cache folder {root} ({error}): {_ANOTHER_FOLDER}") from error
+        remedy = _ANOTHER_FOLDER
+        if error.errno in (errno.EISDIR, errno.ENOTDIR, errno.ELOOP):
+            remedy = f"remove what stands in its place, rm -r {shlex.quote(str(entry))}, or {_ANOTHER_FOLDER}"
+        raise ToolchainError(f"cannot use the cache folder {root} ({error}): {remedy}") from error
     return library
 
 
@@ -318,10 +321,16 @@ def _cache_key(compiler: Compiler, content: Mapping[str, bytes], command: Sequen
 def _intact(entry: Path) -> bool:
     """Whether the entry's library is there and has the checksum that was written with it."""
     try:
-        digest = hashlib.sha256((entry / _LIBRARY).read_bytes()).hexdigest()
-        return (entry / _CHECKSUM).read_text(encoding="ascii", errors="replace") == digest
+        if not all(stat.S_ISREG((entry / name).stat().st_mode) for name in (_LIBRARY, _CHECKSUM)):
+            return False  # to read a pipe would be to wait for its writer
+        return (entry / _CHECKSUM).read_text(encoding="ascii", errors="replace") == _checksum(entry, entry / _LIBRARY)
     except FileNotFoundError:
         return False
+
+
+def _checksum(entry: Path, library: Path) -> str:
+    """Of a library and of the entry that it belongs to: nothing else fits, not even another library with its own."""
+    return hashlib.sha256(entry.name.encode() + library.read_bytes()).hexdigest()
 
 
 @contextlib.contextmanager
@@ -352,7 +361,7 @@ def _build(entry: Path, content: Mapping[str, bytes], command: Sequence[str], co
         library = work / _LIBRARY
         _expect_loadable(library, compiler)
         checksum = work / _CHECKSUM
-        checksum.write_text(hashlib.sha256(library.read_bytes()).hexdigest(), encoding="ascii")
+        checksum.write_text(_checksum(entry, library), encoding="ascii")
         for file in (library, checksum):  # a reader in between sees a mismatch and comes to the lock
             file.chmod(stat.S_IMODE(file.stat().st_mode) & ~(stat.S_IWGRP | stat.S_IWOTH))
             with file.open("rb+") as stream:

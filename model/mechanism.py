@@ -14,8 +14,8 @@ import casadi as ca
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.signals import SineTerm
 
-# Of the critical damping of a motor on its spring: what the fast control adds unless a mechanism says otherwise. The slow
-# law eats much of it (docs/paper.md, E13), so it is no small share.
+# Of the critical damping of a motor on its spring: what the fast control adds unless a mechanism says otherwise. It is
+# no small share, for the slow law eats much of it (docs/paper.md, E13).
 _FAST_DAMPING = 0.5
 
 
@@ -32,6 +32,9 @@ class Mechanism(ABC):
     start_position    initial joint coordinates; () for all zero
     start_rate        initial joint rates; () for all zero
     control_defaults  what the controller's parameters are for this arm, by name: a number, or one per joint
+    source            where its equations and numbers come from, a sentence; "" where there is nothing to cite
+    sampling          what sample periods and delays its loop was seen to bear, Markdown for those who embed it; ""
+                      where nothing was measured
     """
 
     name: ClassVar[str]
@@ -44,6 +47,8 @@ class Mechanism(ABC):
     start_position: ClassVar[tuple[float, ...]] = ()
     start_rate: ClassVar[tuple[float, ...]] = ()
     control_defaults: ClassVar[Mapping[str, float | tuple[float, ...]]] = {}
+    source: ClassVar[str] = ""
+    sampling: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
         """Fill in what the class leaves open and depends on how many joints it has."""

@@ -34,7 +34,7 @@ from springline.runner.errors import InputError, Problem
 from springline.runner.plan import Chunk, Columns, Group, Plan
 from springline.runner.scenario import Scenario, expect_scenario
 from springline.runner.simulate import field as unit_field
-from springline.runner.simulate import metrics_table, trajectory_schema
+from springline.runner.simulate import metrics_schema, metrics_table, trajectory_schema
 from springline.runner.terminal import version
 from springline.runner.work import Outcome, Work, parcel, perform, perform_parcel, work_for
 
@@ -48,7 +48,7 @@ _CALIBRATION_STEPS = 2000
 _TIMED = 3
 _CHUNKS_PER_THREAD = 8
 _FOOTER = 600  # bytes per column of a Parquet file, for what is said of it
-_COMPRESSION = 3  # the most that tables of mostly doubles have been seen to shrink
+_COPIES = 2  # of a table in memory: the loop's results and the table's columns
 
 
 # --- where runs are simulated ----------------------------------------------------------------------------
@@ -341,8 +341,8 @@ def refuse_oversized(plan: Plan, where: Place, threads: int, left: int | None = 
     """Raise InputError for a sweep that needs more memory or room than there is.
 
     threads, left  as for `estimate`
-    Only what is certain is refused: a table may compress to a third of its size, and a chunk's trajectories are held
-    at least twice, as the loop writes them and as they are stored.
+    Doubles hardly compress: what does not fit as it is estimated is refused. A chunk's trajectories are held at least
+    twice, as the loop writes them and as they are stored.
     """
     source = plan.sweep.source
     for group in plan.groups if plan.sweep.keep else ():
@@ -358,9 +358,9 @@ def refuse_oversized(plan: Plan, where: Place, threads: int, left: int | None = 
             raise InputError(Problem(source, "keep.trajectories", text, str(plan.sweep.keep)))
     free = where.free()
     share = 1.0 if left is None else left / plan.runs
-    need = int(share * dataset_bytes(plan) / _COMPRESSION)
+    need = int(share * dataset_bytes(plan))
     if free is not None and need > free:
-        text = f"has {free:,} bytes free, and the dataset takes {need:,} at least: choose another place with -o"
+        text = f"has {free:,} bytes free, and the dataset takes about {need:,}: choose another place with -o"
         if plan.sweep.keep:
             text += ", or keep fewer trajectories"
         raise InputError(Problem(where.name, "", text))
@@ -376,8 +376,8 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
              the kernel (compiled on first use, then cached)
     jobs     threads, None for one per processor
     Returns a table with one row a run: run, the varied keys, every metric, status, t_end. It does not depend on `jobs`.
-    Raises TypeError for arguments of another kind, InputError (a ValueError) for an unknown key, a value out of bounds
-    and unequal lengths, ValueError for jobs < 1, ToolchainError if there is no C compiler.
+    Raises TypeError for arguments of another kind, InputError (a ValueError) for an unknown key, a value out of bounds,
+    unequal lengths and more runs than memory holds, ValueError for jobs < 1, ToolchainError if there is no C compiler.
     """
     expect_scenario(scenario)
     expect_keys(columns, "columns such as {'control.delta': array}")
@@ -392,6 +392,13 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
         raise InputError(Problem(scenario.source, "", text, str(lengths)))
     slots, runs = scenario.slots_for(arrays), max(lengths.values())
     work = work_for(scenario, slots)
+    need = _COPIES * 8 * runs * (len(metrics_schema(work.system)) + len(arrays) + len(work.parameters))
+    if need > memory():
+        text = (
+            f"expected fewer runs, or a sweep (springline batch): {runs:,} runs take {need:,} bytes, and there are "
+            f"{memory():,} of memory"
+        )
+        raise InputError(Problem(scenario.source, "", text))
     result = metrics_table(work.system, _over_threads(work, work.chosen(slots, runs), jobs))
     keys = scenario.numeric_keys()
     for position, (key, array) in enumerate(arrays.items()):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
@@ -25,11 +25,14 @@ Document = dict[str, dict[str, Any]]
 _WHOLE = 1e-9
 
 
-def resolve(raw: Mapping[str, object], where: str, folder: Path) -> tuple[Document, tuple[Table, ...], tuple[str, ...]]:
+def resolve(
+    raw: Mapping[str, object], where: str, folder: Path, *, read: bool = True
+) -> tuple[Document, tuple[Table, ...], tuple[str, ...]]:
     """A document with every default filled in, its signal tables, and notes on what was made of them.
 
     where   what the document came from, for messages
     folder  what relative paths refer to
+    read    whether its signal files are read; a document that is going to be changed is not judged by them
     Raises InputError with all problems.
     """
     problems = [unknown(where, key, "table", key, schema.TABLES) for key in raw if key not in schema.TABLES]
@@ -83,7 +86,10 @@ def resolve(raw: Mapping[str, object], where: str, folder: Path) -> tuple[Docume
     notes: list[str] = []
     for name in with_table:
         try:
-            table, remarks = _load_table(document[name], name, units[name], folder, where)
+            time, *channels = _columns(document[name], name, units[name], folder, where)
+            if not read:
+                continue
+            table, remarks = _load_table(document[name], name, time, channels, where)
             tables.append(table)
             if duration is not None:
                 notes += [*remarks, _expect_overlap(table, document[name], name, duration, where)]
@@ -214,13 +220,8 @@ def _whole_problems(document: Document, key: str, where: str) -> list[Problem]:
     return [Problem(where, key, text, f"{time!r} s")]
 
 
-def _load_table(
-    table: dict[str, Any], name: str, units: Mapping[str, str], folder: Path, where: str
-) -> tuple[Table, list[str]]:
-    """The signal table that [reference] or [base_motion] asks for, with notes on it.
-
-    Makes path and units in `table` explicit.
-    """
+def _columns(table: dict[str, Any], name: str, units: Mapping[str, str], folder: Path, where: str) -> list[Column]:
+    """What [reference] or [base_motion] reads of its file, the time first; makes path and units in `table` explicit."""
     columns, chosen = table["columns"], table["units"]
     si = {"t": "s", **units}
     problems = [
@@ -235,8 +236,8 @@ def _load_table(
         raise InputError(*problems)
     table["units"] = chosen = {key: chosen.get(key, si[key]) for key in si if key in columns}
     key = f"{name}.path"
-    table["path"] = path = canonical_path(table["path"], folder, where, key)
-    time, *channels = (
+    table["path"] = canonical_path(table["path"], folder, where, key)
+    return [
         Column(
             columns[item],
             f"{name}.columns.{item}",
@@ -244,7 +245,14 @@ def _load_table(
             HALF_TURN.get(unit, math.inf),
         )
         for item, unit in chosen.items()
-    )
+    ]
+
+
+def _load_table(
+    table: Mapping[str, Any], name: str, time: Column, channels: Sequence[Column], where: str
+) -> tuple[Table, list[str]]:
+    """The signal table that [reference] or [base_motion] asks for, with notes on it."""
+    path, key = table["path"], f"{name}.path"
     data = read_signal_file(path, where, key)
     ends = cast(Ends, table["ends"])
     return read_table(data, path, time, channels, ends, t0=table["t0"], where=where, key=key)

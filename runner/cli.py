@@ -105,6 +105,7 @@ def springline(
 def main() -> None:
     """Entry point of the `springline` command."""
     _open_streams()
+    _expect_working_directory()
     _mend_environment()
     code: Any = 0
     try:
@@ -119,6 +120,15 @@ def main() -> None:
             complain(f"Error: cannot write to the standard output: {error}")
         code = code or 1
     sys.exit(code)
+
+
+def _expect_working_directory() -> None:
+    """Exit with a message where the working directory was deleted: no path could be told from there."""
+    try:
+        os.getcwd()
+    except OSError as error:
+        complain(f"Error: the working directory cannot be used ({error.strerror}): change to one that exists")
+        sys.exit(1)
 
 
 def _mend_environment() -> None:

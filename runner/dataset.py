@@ -20,6 +20,7 @@ import os
 import re
 import shutil
 import socket
+import stat
 import tempfile
 import tomllib
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
@@ -161,15 +162,23 @@ class Folder:
 
     def local(self) -> Path:
         """The folder itself."""
-        return self._path.resolve()
+        return Path(os.path.realpath(self._path))  # resolve() breaks on links in a circle
 
     def read(self, name: str) -> bytes:
         """Content of a file."""
-        return (self._path / name).read_bytes()
+        return self._regular(name).read_bytes()
 
     def open(self, name: str) -> Any:
         """A file to read from."""
-        return (self._path / name).open("rb")
+        return self._regular(name).open("rb")
+
+    def _regular(self, name: str) -> Path:
+        """The path of a file that ends, as pipes and devices need not. Raises OSError for these."""
+        path = self._path / name
+        mode = path.stat().st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+            raise OSError(errno.EINVAL, "a pipe or a device: expected a regular file", str(path))
+        return path
 
     def write(self, name: str, content: bytes) -> None:
         """Write a file, whole or not at all."""
@@ -398,7 +407,8 @@ class Dataset:
                 how = str(error)
             case _:
                 how = "an entry is not what is written there"
-        return InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({how})"))
+        remedy = "bring it back from a copy, or begin the dataset anew with another -o"
+        return InputError(Problem(f"{self.place.name}/{DESCRIPTION}", "", f"is damaged ({how}): {remedy}"))
 
     def expect_format(self, stored: Mapping[str, Any]) -> None:
         """Raise InputError unless the dataset was begun by a version that describes and seals it as this one does."""
@@ -532,7 +542,23 @@ def read_dataset(destination: str | Path, columns: Sequence[str] | None = None) 
         if table.schema != tables[0].schema:
             text = "has other columns than the first part: springline batch --resume makes what is not whole again"
             raise InputError(Problem(f"{dataset.place.name}/{name}", "", text))
+    if columns is None or "run" in columns:
+        _expect_each_run_once(dataset, tables)
     return pa.concat_tables(tables)
+
+
+def _expect_each_run_once(dataset: Dataset, tables: Sequence[pa.Table]) -> None:
+    """Raise InputError for a part that holds runs that an earlier one has: a copy in another's place, or a surplus."""
+    last = -1
+    for name, table in zip(dataset.parts(), tables, strict=True):
+        runs = table["run"].to_numpy()
+        if len(runs) and (runs[0] <= last or np.any(np.diff(runs) <= 0)):
+            text = (
+                "holds runs that an earlier part has: springline batch --resume makes a part of the sweep again; one "
+                "that is none of its parts is to be removed"
+            )
+            raise InputError(Problem(f"{dataset.place.name}/{name}", "", text))
+        last = int(runs[-1]) if len(runs) else last
 
 
 def _as_written(description: Mapping[str, Any]) -> dict[str, Any]:

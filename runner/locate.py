@@ -96,7 +96,7 @@ def _kind_at(path: Path) -> Kind:
     """What a folder is by the files that our commands leave in it, and a file by its text."""
     try:
         if not path.is_dir():
-            return kind_of(read_toml(_contents(path, _LARGEST_SCENARIO).decode("utf-8-sig")))
+            return kind_of(read_toml(file_text(path)))
         if (path / "sweep.json").exists():
             return "dataset"
         return "folder of a run" if (path / "scenario.toml").exists() else ""
@@ -115,7 +115,7 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         return file.read_text("utf-8"), Path(str(file)).parent
     path = Path(source)
     try:
-        return _contents(path, _LARGEST_SCENARIO).decode("utf-8-sig"), Path(os.path.realpath(path)).parent
+        return file_text(path), Path(os.path.realpath(path)).parent
     except (FileNotFoundError, NotADirectoryError) as error:
         if path.suffix == ".toml" and path.parent.is_dir():
             there = tuple(sorted(item.name for item in path.parent.glob("*.toml")))
@@ -127,8 +127,17 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         text = "is a folder: expected a TOML file or the name of a packaged scenario"
         raise InputError(Problem(name, "", text)) from error
     except (OSError, ValueError) as error:  # no UTF-8, and names that no file can have
-        why = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({why})")) from error
+        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({reason(error)})")) from error
+
+
+def file_text(path: Path) -> str:
+    """Text of a scenario's or a sweep's file. Raises OSError and ValueError for what cannot be one."""
+    return _contents(path, _LARGEST_SCENARIO).decode("utf-8-sig")
+
+
+def reason(error: Exception) -> object:
+    """What the system says of a failure, without the path."""
+    return error.strerror if isinstance(error, OSError) and error.strerror else error
 
 
 def _contents(path: Path, largest: int) -> bytes:
@@ -192,5 +201,4 @@ def read_signal_file(path: str, where: str, key: str) -> bytes:
         there = tuple(sorted(item.name for item in file.parent.glob("*.csv")))
         raise InputError(Problem(where, key, f"there is no file {path}", "", file.name, there)) from error
     except (OSError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise InputError(Problem(where, key, f"{path} cannot be read ({why})")) from error
+        raise InputError(Problem(where, key, f"{path} cannot be read ({reason(error)})")) from error

@@ -266,11 +266,11 @@ class Scenario:
 
     # Changed and written
 
-    def with_overrides(self, overrides: Mapping[str, object]) -> Scenario:
+    def with_overrides(self, overrides: Mapping[str, object], *, read: bool = True) -> Scenario:
         """This scenario with other values at some dotted keys ("control.mu.0", "plant.m3.scale", …).
 
         A new kind of reference or base motion, another control mode or mechanism drops what belonged to the old one.
-        Paths count from `folder`.
+        Paths count from `folder`. What is going to be changed once more need not `read` its signal files.
         Raises TypeError for what is no mapping of texts, InputError for whatever a file may not hold either.
         """
         expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
@@ -290,7 +290,7 @@ class Scenario:
                 problems.append(Problem(where, key, f"expected a value that TOML can hold: {error}"))
         if problems:
             raise InputError(*problems)
-        return Scenario(self.source, self.folder, *resolve(document, where, self.folder))
+        return Scenario(self.source, self.folder, *resolve(document, where, self.folder, read=read))
 
     def _without_excluded(self, overrides: Mapping[str, object]) -> Document:
         """A copy of the document without what the overrides exclude."""
@@ -339,6 +339,21 @@ def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = N
     Raises InputError that names all mistakes at once: file, key, what was expected, the nearest valid name. Raises
     TypeError for a source that is no path or name, and overrides that are no mapping of texts.
     """
+    if overrides is None:
+        return _loaded(source, read=True)
+    expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
+    return draft_scenario(source).with_overrides(overrides) if overrides else _loaded(source, read=True)
+
+
+def draft_scenario(source: str | Path) -> Scenario:
+    """A scenario that is going to be changed: its signal files are not read yet, for the change may be to them.
+
+    Raises as `load_scenario` does.
+    """
+    return _loaded(source, read=False)
+
+
+def _loaded(source: str | Path, *, read: bool) -> Scenario:
     _expect_name(source)
     name = str(source)
     text, folder = read_scenario(source)
@@ -347,8 +362,7 @@ def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = N
     except ValueError as error:
         raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
     expect_kind("scenario", source, document)
-    scenario = Scenario(name, Path(), *resolve(document, name, folder))
-    return scenario if overrides is None else scenario.with_overrides(overrides)
+    return Scenario(name, Path(), *resolve(document, name, folder, read=read))
 
 
 def _expect_name(given: object) -> None:

@@ -27,6 +27,7 @@ where the other's stands.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -36,8 +37,8 @@ from typing import Any, Literal, cast, get_args
 from springline.codegen.nearest import nearest
 from springline.codegen.numbers import double
 from springline.runner.errors import InputError, Problem, unknown
-from springline.runner.locate import expect_kind, packaged_sweeps, scenarios_folder
-from springline.runner.scenario import Scenario, load_scenario
+from springline.runner.locate import expect_kind, file_text, packaged_sweeps, reason, scenarios_folder
+from springline.runner.scenario import Scenario, draft_scenario, load_scenario
 from springline.runner.schema import given_text
 from springline.runner.toml_text import read_toml, value_text
 
@@ -125,22 +126,7 @@ def load_sweep(source: str | Path, overrides: Mapping[str, object] | None = None
         document = read_toml(text)
     except ValueError as error:
         raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
-    sweep = _Reader(name, folder).sweep(document)
-    return sweep if not overrides else _overridden(sweep, overrides)
-
-
-def _overridden(sweep: Sweep, overrides: Mapping[str, object]) -> Sweep:
-    """The sweep with another scenario. Raises InputError for a key that has no effect because it varies."""
-    where = f"override of {sweep.source}"
-    problems = [
-        Problem(where, key, f"it varies in this sweep (vary.{axis.key}): an override has no effect")
-        for key in overrides
-        for axis in sweep.axes
-        if _covers(axis.key, key)
-    ]
-    if problems:
-        raise InputError(*problems)
-    return replace(sweep, scenario=sweep.scenario.with_overrides(overrides))
+    return _Reader(name, folder, overrides or {}).sweep(document)
 
 
 def _covers(varied: str, key: str) -> bool:
@@ -173,21 +159,22 @@ def _read(source: str | Path) -> tuple[str, Path]:
         return (folder / f"{name}.toml").read_text("utf-8"), Path(str(folder))
     expect_kind("sweep", source)
     path = Path(source)
-    if not path.is_file():
-        there = sorted(str(path.parent / item.name) for item in path.parent.glob("*.toml"))
-        raise InputError(unknown(name, "", "file or packaged sweep", name, [*packaged_sweeps(), *there]))
     try:
-        return path.read_text("utf-8-sig"), path.resolve().parent
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({error})")) from error
+        return file_text(path), Path(os.path.realpath(path)).parent
+    except (FileNotFoundError, NotADirectoryError) as error:
+        there = sorted(str(path.parent / item.name) for item in path.parent.glob("*.toml"))
+        raise InputError(unknown(name, "", "file or packaged sweep", name, [*packaged_sweeps(), *there])) from error
+    except (OSError, ValueError) as error:  # no UTF-8, and names that no file can have
+        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({reason(error)})")) from error
 
 
 class _Reader:
     """Checks one sweep file, gathering its problems."""
 
-    def __init__(self, name: str, folder: Path) -> None:
+    def __init__(self, name: str, folder: Path, overrides: Mapping[str, object] | None = None) -> None:
         self._name = name
         self._folder = folder
+        self._overrides = overrides or {}
         self._problems: list[Problem] = []
 
     def sweep(self, document: Mapping[str, Any], scenario: Scenario | None = None) -> Sweep:
@@ -204,11 +191,25 @@ class _Reader:
         chunk = self._whole(document, "chunk", 0, 1, _LARGEST_CHUNK)
         keep = self._keep(document.get("keep", {}))
         axes = self._axes(document.get("vary", {}), method)
+        self._expect_effect(axes)
         scenario = scenario or self._scenario(document)
         samples = self._samples(document, cast(Method, method), axes)
         if self._problems or scenario is None:
             raise InputError(*self._problems)
         return Sweep(self._name, scenario, cast(Method, method), samples, seed, chunk, keep, tuple(axes))
+
+    def _expect_effect(self, axes: Sequence[Axis]) -> None:
+        """An override of a key that varies would have none."""
+        self._problems += [
+            Problem(
+                f"override of {self._name}",
+                key,
+                f"it varies in this sweep (vary.{axis.key}): an override has no effect",
+            )
+            for key in self._overrides
+            for axis in axes
+            if _covers(axis.key, key)
+        ]
 
     def _wrong(self, key: str, expected: str, given: object) -> None:
         self._problems.append(Problem(self._name, key, expected, given_text(given)))
@@ -238,13 +239,18 @@ class _Reader:
             self._wrong("set", "expected a table of dotted keys", overrides)
             return None
         path, key = self._folder / source, "scenario"
+        changes = [("set", dict(_flattened(overrides)), self._folder), ("", self._overrides, Path())]
+        changes = [change for change in changes if change[1]]
         try:
-            scenario = load_scenario(path if path.is_file() else source)
-            key = "set"
-            return replace(scenario, folder=self._folder).with_overrides(dict(_flattened(overrides)))
+            load = draft_scenario if changes else load_scenario
+            scenario = load(path if path.is_file() else source)
+            for k, (label, change, folder) in enumerate(changes):  # files are read when all changes are made
+                key = label
+                scenario = replace(scenario, folder=folder).with_overrides(change, read=k + 1 == len(changes))
+            return replace(scenario, folder=self._folder)
         except InputError as error:
-            there = f"{self._name}: {key}"
-            self._problems += [replace(problem, where=f"{there}: {problem.where}") for problem in error.problems]
+            there = f"{self._name}: {key}: " if key else ""
+            self._problems += [replace(problem, where=f"{there}{problem.where}") for problem in error.problems]
             return None
 
     def _samples(self, document: Mapping[str, Any], method: Method, axes: Sequence[Axis]) -> int:

@@ -235,3 +235,10 @@ def test_commands_within_the_text_exist_with_their_options(code: str) -> None:
             assert set(re.findall(r"\[(\w+)\]", wanted)) <= set(extras)
         case _:
             pytest.fail(f"no way to check {code}")
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name != "paper.md"], ids=lambda page: page.name)
+def test_code_fits_80_columns(page: Path) -> None:
+    """But for the equations of docs/paper.md, which stand as the paper has them."""
+    wide = [str(block) for block in blocks(page) if max(map(len, block.text.splitlines()), default=0) > 80]
+    assert not wide

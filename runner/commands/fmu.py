@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from springline.codegen.manifest import read_manifest, write_tree
+from springline.codegen.manifest import MANIFEST, read_manifest, write_tree
 from springline.runner.commands.options import (
     TUNABLE,
     AsJson,
@@ -61,7 +61,7 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
 
     def command(
         scenario: ScenarioName,
-        part: PartOption,
+        part: PartOption = Part.loop,
         output: Output = Path("fmu"),
         changes: Changes = None,
         name: Name = None,
@@ -134,11 +134,17 @@ def _earlier(folder: Path, *, keep_edited: bool) -> dict[str, dict[str, str]]:
     """What the folder's manifest says of FMUs that are still there, by file name: those that are as they were written.
 
     One that was edited is in the way (write_tree says so), unless it is asked to be kept.
-    Raises FolderConflict if the folder belongs to another command.
+    Raises FolderConflict if the folder belongs to another command, InputError for a manifest that is not whole.
     """
     manifest = read_manifest(folder, _KIND)
     if manifest is None:
         return {}
+    fmus = manifest.get("fmus")
+    if not isinstance(fmus, list) or not all(
+        isinstance(fmu, dict) and isinstance(fmu.get("name"), str) for fmu in fmus
+    ):
+        text = "does not say which FMUs it lists: remove it, or export into another folder"
+        raise InputError(Problem(str(folder / MANIFEST), "fmus", text))
     written = {entry["path"]: entry["sha256"] for entry in manifest["files"]}
 
     def stays(name: str) -> bool:
@@ -147,4 +153,4 @@ def _earlier(folder: Path, *, keep_edited: bool) -> dict[str, dict[str, str]]:
             return False
         return keep_edited or hashlib.sha256(place.read_bytes()).hexdigest() == written.get(name)
 
-    return {entry["name"]: entry for entry in manifest["fmus"] if stays(entry["name"])}
+    return {entry["name"]: entry for entry in fmus if stays(entry["name"])}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from enum import StrEnum
 from pathlib import Path
@@ -111,7 +112,7 @@ def _refuse_too_large(folder: Path, scenario: Scenario, form: Format) -> None:
     from springline.runner.simulate import refuse_large, refuse_rows, row_size
 
     refuse_large(scenario)
-    place = next(place for place in (folder, *folder.resolve().parents) if place.exists())
+    place = next(place for place in (folder, *Path(os.path.realpath(folder)).parents) if place.exists())
     free = shutil.disk_usage(place).free
     row = row_size(scenario) if form is Format.parquet else round(_TEXT_SIZE * row_size(scenario))
     refuse_rows(scenario, free // row, f"all that {free / 1e9:.3g} GB of free disk space at {place} have room for")

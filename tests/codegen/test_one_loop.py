@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import subprocess
+import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -177,7 +179,7 @@ def test_other_arms_are_exported_as_c_that_checks_itself(
     )
     assert done.returncode == 0, done.stdout
     texts = "".join(path.read_text() for path in folder.rglob("*") if path.suffix in (".c", ".h", ".md", ".txt"))
-    for foreign in ("lift", "rotation", "Guo"):
+    for foreign in ("lift", "rotation", "Guo", "kHz", "0.7 ms"):
         assert foreign not in texts
 
 
@@ -187,5 +189,8 @@ def test_fmus_of_another_arm_are_valid(part: Any, version: Any, tmp_path: Path) 
     structure = structure_of("three_links")
     settings = Settings(duration=1.0, step=STEP, period=1e-3)
     content = fmu(structure, values_of(structure), settings, part=part, version=version, identifier="a", name="a")
+    page = zipfile.ZipFile(io.BytesIO(content)).read("documentation/index.html").decode()
+    for foreign in ("lift", "rotation", "Guo", "series"):
+        assert foreign not in page
     (tmp_path / "a.fmu").write_bytes(content)
     assert client_library("fmpy.validation").validate_fmu(str(tmp_path / "a.fmu")) == []

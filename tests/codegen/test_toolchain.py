@@ -406,6 +406,37 @@ def test_a_damaged_library_with_a_right_checksum_is_rebuilt(content: bytes) -> N
     assert load(build_library(SOURCES, main="main.c")).value() == 7
 
 
+def test_a_library_cut_short_or_of_another_entry_is_rebuilt_whatever_checksum_lies_beside_it() -> None:
+    """To load it would kill the process, or load what computes something else."""
+    library = build_library(SOURCES, main="main.c")
+    other = build_library({"main.c": "int value(void);\nint value(void) { return 8; }\n"}, main="main.c")
+    whole = library.read_bytes()
+    for content, checksum in (
+        (whole[: len(whole) // 2], hashlib.sha256(whole[: len(whole) // 2]).hexdigest()),
+        (other.read_bytes(), (other.parent / "library.sha256").read_text()),
+    ):
+        library.unlink()
+        library.write_bytes(content)
+        (library.parent / "library.sha256").write_text(checksum)
+        assert load(build_library(SOURCES, main="main.c")).value() == 7
+
+
+@pytest.mark.parametrize("name", ["library.so", "library.sha256"])
+def test_a_pipe_in_the_cache_is_not_waited_for(name: str) -> None:
+    library = build_library(SOURCES, main="main.c")
+    (library.parent / name).unlink()
+    os.mkfifo(library.parent / name)
+    assert load(build_library(SOURCES, main="main.c")).value() == 7
+
+
+def test_a_folder_where_a_library_belongs_is_named() -> None:
+    library = build_library(SOURCES, main="main.c")
+    library.unlink()
+    library.mkdir()
+    with pytest.raises(ToolchainError, match=f"rm -r {library.parent}"):
+        build_library(SOURCES, main="main.c")
+
+
 CRASHING = "__attribute__((constructor)) static void crash(void) { *(volatile int *)0 = 1; }"
 
 LYING = {

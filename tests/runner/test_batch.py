@@ -482,6 +482,15 @@ def test_what_belongs_to_another_command_is_told(
     assert not Path("results").exists()
 
 
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+def test_a_sweep_that_does_not_end_is_told(kind: str, tmp_path: Path, command: Command) -> None:
+    path = tmp_path / "sweep.toml"
+    os.mkfifo(path) if kind == "pipe" else path.symlink_to("/dev/zero")
+    done = command("batch", path)
+    assert done.exit_code == 2
+    assert "a pipe or a device: expected a regular file" in done.stderr
+
+
 def test_set_overrides_the_scenario_of_a_sweep(sweep: Path, tmp_path: Path, command: Command) -> None:
     folder, change = tmp_path / "data", ["--set", "simulation.duration=0.001", "--set", 'control.law="power"']
     done = command("batch", sweep, "-o", folder, "--no-plot", *change)
@@ -518,7 +527,7 @@ def test_a_sweep_larger_than_memory_or_disk_is_refused_before_it_starts(
     monkeypatch.setattr(Folder, "free", lambda self: 5000)
     done = command("batch", sweep, "-o", tmp_path / "data", "--jobs", 1)
     assert done.exit_code == 2
-    assert re.search(r"data: has 5,000 bytes free, and the dataset takes [\d,]{6,} at least: choose", done.stderr)
+    assert re.search(r"data: has 5,000 bytes free, and the dataset takes about [\d,]{6,}: choose", done.stderr)
     assert not (tmp_path / "data").exists()
     monkeypatch.undo()
     assert command("batch", sweep, "-o", tmp_path / "data", "--jobs", 1, "--no-plot").exit_code == 0
@@ -771,3 +780,11 @@ def test_sizes_and_times_are_for_people() -> None:
         "4.6 days",
     ]
     assert [size_text(b) for b in (12, 34_567, 5.6e9, 7e13)] == ["12 B", "34.6 kB", "5.6 GB", "70 TB"]
+
+
+def test_a_batch_beyond_memory_is_refused_before_it_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = load_scenario("paper/nominal", {"simulation.duration": 0.001})
+    monkeypatch.setattr(importlib.import_module("springline.runner.batch"), "memory", lambda: 100_000)
+    assert len(batch(scenario, {"control.delta": np.full(50, 0.05)}, jobs=1)) == 50
+    with pytest.raises(InputError, match=r"expected fewer runs.*5,000 runs take [\d,]+ bytes, and there are 100"):
+        batch(scenario, {"control.delta": np.full(5000, 0.05)}, jobs=1)

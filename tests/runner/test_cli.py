@@ -878,3 +878,22 @@ def test_a_trajectory_beyond_memory_is_refused(elsewhere: Path) -> None:
     assert "simulation.output_every" in message
     assert "expected at least 101" in message
     assert not Path("out").exists()
+
+
+def test_a_working_directory_that_was_deleted_is_told(tmp_path: Path) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    tool = Path(sys.executable).with_name("springline")
+    command = f"cd {gone} && rmdir {gone} && {tool} list laws"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: the working directory cannot be used")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_dataset_behind_links_in_a_circle_is_the_users_mistake(tmp_path: Path) -> None:
+    (tmp_path / "a").symlink_to(tmp_path / "b")
+    (tmp_path / "b").symlink_to(tmp_path / "a")
+    result = springline("replay", tmp_path / "a", "0")
+    assert result.exit_code == 2
+    assert "symbolic links" in result.stderr

@@ -21,12 +21,14 @@ from typing import Any
 import pyarrow as pa
 import pytest
 from pyarrow import parquet
+from typer.testing import CliRunner
 
 from springline.codegen import atomic, lanes
 from springline.codegen.atomic import TEMPORARY
 from springline.codegen.kernel_source import runtime_sources
 from springline.runner import work
 from springline.runner.batch import open_pool, run_sweep, versions
+from springline.runner.cli import app
 from springline.runner.commands.batch import batch, replay
 from springline.runner.dataset import Dataset, changes, place, read_dataset
 from springline.runner.errors import InputError
@@ -671,10 +673,33 @@ def test_a_tmpfs_that_is_full(write: Callable[..., Path], tmp_path: Path, requir
     done = subprocess.run(script, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     refused, first, second = done.stdout.splitlines()
-    assert re.match(r"2 Error: .*has [\d,]+ bytes free, and the dataset takes [\d,]+ at least: choose another", refused)
+    assert re.match(r"2 Error: .*has [\d,]+ bytes free, and the dataset takes about [\d,]+: choose another", refused)
     assert first.startswith("1 ")
     assert "No space left on device" in first
     assert "--resume" in first
     assert second.startswith("0 ")
     run(sweep, tmp_path / "other")
     assert content(tmp_path / "disk-copy") == content(tmp_path / "other")
+
+
+@pytest.mark.parametrize("name", ["sweep.json", "part-000000.parquet"])
+def test_a_pipe_in_a_dataset_is_not_waited_for(name: str, write: Callable[..., Path], tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    run(write(40), data)
+    (data / name).unlink()
+    os.mkfifo(data / name)
+    words = ["replay", str(data), "0", "-o", str(tmp_path / "run"), "--no-plot"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 2
+    assert "a pipe or a device" in done.stderr
+
+
+@pytest.mark.parametrize("twin", [1, 2])
+def test_a_dataset_that_has_a_run_twice_is_not_read(twin: int, write: Callable[..., Path], tmp_path: Path) -> None:
+    """One part copied over another, or besides all others."""
+    data = tmp_path / "data"
+    run(write(64), data)
+    assert len(read_dataset(data)) == 64
+    shutil.copy(data / "part-000000.parquet", data / f"part-00000{twin}.parquet")
+    with pytest.raises(InputError, match=f"part-00000{twin}.parquet: holds runs that an earlier part has"):
+        read_dataset(data)

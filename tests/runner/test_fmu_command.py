@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import json
 import os
@@ -79,9 +80,15 @@ def test_scenario_file_name_and_tunable(tmp_path: Path, monkeypatch: pytest.Monk
     assert '<DefaultExperiment startTime="0.0" stopTime="3.0" stepSize="0.0001" />' in text
 
 
+def test_the_part_is_the_loop_unless_another_is_asked_for(tmp_path: Path) -> None:
+    result = springline("export", "fmu2", "paper/nominal", "-o", tmp_path, "--json")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["rows"] == [{"path": "nominal_loop_fmi2.fmu", "change": "written"}]
+
+
 def test_wrong_input(tmp_path: Path, folder: Path) -> None:
     export = ("export", "fmu3", "paper/nominal")
-    assert "--part" in refused(*export)
+    assert "--part" in refused(*export, "--part")
     assert "nobody" in refused(*export, "--part", "nobody")
     out = ("--part", "plant", "-o", tmp_path / "out")
     assert "the nearest name is 'control.delta'" in refused(*export, *out, "--tunable", "control.dleta")
@@ -113,3 +120,14 @@ def test_coupled_with_a_plant_that_is_not_ours(folder: Path) -> None:
         printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         worst = float(printed.rpartition("last second: ")[2])
         assert 1e-4 < worst < 1e-2  # m, rad: friction and lag that the controller does not know leave something
+
+
+@pytest.mark.parametrize("fmus", ["", ', "fmus": 3', ', "fmus": [{}]', ', "fmus": [{"name": 3}]'])
+def test_a_manifest_that_does_not_say_its_fmus_is_told_and_nothing_is_lost(fmus: str, tmp_path: Path) -> None:
+    digest = hashlib.sha256(b"kept").hexdigest()
+    (tmp_path / "old.fmu").write_bytes(b"kept")
+    listed = f'{{"path": "old.fmu", "sha256": "{digest}"}}'
+    (tmp_path / "manifest.json").write_text(f'{{"kind": "fmu", "files": [{listed}]{fmus}}}')
+    message = refused("export", "fmu2", "paper/nominal", "-o", tmp_path)
+    assert "manifest.json: fmus: does not say which FMUs it lists" in message
+    assert (tmp_path / "old.fmu").read_bytes() == b"kept"

@@ -15,7 +15,9 @@ from typer.testing import CliRunner, Result
 from springline.runner import batch, load_scenario, simulate
 from springline.runner.cli import app
 from springline.runner.dataset import read_dataset
+from springline.runner.errors import InputError
 from springline.runner.scenario import Scenario
+from springline.runner.sweep import load_sweep
 
 RECORD = {
     "kind": "table",
@@ -182,3 +184,38 @@ def test_nothing_is_written_where_the_record_and_the_run_do_not_meet(
     assert result.exit_code == 2
     assert "base_motion.t0" in result.stderr and "lasts from 0 to 359.86328125 s" in result.stderr
     assert not Path("out").exists()
+
+
+UNIX = 1.7e9
+
+
+@pytest.fixture
+def unix(tmp_path: Path) -> Path:
+    """A scenario whose record is stamped in Unix seconds and which does not say where in it the run begins."""
+    t = [UNIX + k / 10 for k in range(200)]
+    rows = "\n".join(f"{time!r},{0.1 * math.sin(0.9 * (time - UNIX))!r}" for time in t)
+    (tmp_path / "unix.csv").write_text(f"t,heave\n{rows}\n")
+    path = tmp_path / "unix.toml"
+    path.write_text(
+        '[base_motion]\nkind = "table"\npath = "unix.csv"\ncolumns = { t = "t", shake = "heave" }\n'
+        "[simulation]\nduration = 0.5\n"
+    )
+    return path
+
+
+def test_the_remedy_for_a_record_beside_the_run_can_be_given_as_an_override(unix: Path, tmp_path: Path) -> None:
+    """The file is not judged by what an override replaces."""
+    with pytest.raises(InputError, match=r"base_motion\.t0: .* which is outside"):
+        load_scenario(unix)
+    expected = simulate(load_scenario(unix, {"base_motion.t0": UNIX + 3.0})).trajectory["y_r1"].to_numpy()
+    assert expected[0] == pytest.approx(0.1 * math.sin(2.7), abs=1e-4)
+    with pytest.raises(InputError, match=r"override of .*unix.toml: base_motion\.t0: .*1700000100"):
+        load_scenario(unix, {"base_motion.t0": UNIX + 100.0})
+    sweep = tmp_path / "sweep.toml"
+    vary = '[vary]\n"control.delta" = { values = [0.04, 0.05] }\n'
+    sweep.write_text(f'scenario = "unix.toml"\nsamples = 2\n[set]\n"base_motion.t0" = {UNIX + 3.0}\n{vary}')
+    assert load_sweep(sweep).scenario == load_scenario(unix, {"base_motion.t0": UNIX + 3.0})
+    sweep.write_text(f'scenario = "unix.toml"\nsamples = 2\n{vary}')
+    with pytest.raises(InputError, match=r"sweep.toml: scenario: .*unix.toml: base_motion\.t0"):
+        load_sweep(sweep)
+    assert load_sweep(sweep, {"base_motion.t0": UNIX + 3.0}).scenario.tables()[0].t0 == pytest.approx(-3.0)

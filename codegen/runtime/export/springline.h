@@ -82,8 +82,8 @@ int springline_reset(springline_controller *controller);
 
 /*
  * Computes the command for one sample. The law keeps no state from step to step, but the arm does: sampled too slowly,
- * or with its command too late, it leaves its reference or diverges (README.md has figures). Whatever happens *command is
- * set: to the fallback if the status is not SPRINGLINE_OK. diagnostics may be NULL; it is zero if the status is not
+ * or with its command too late, it leaves its reference or diverges (README.md says more). Whatever happens *command is set:
+ * to the fallback if the status is not SPRINGLINE_OK. diagnostics may be NULL; it is zero if the status is not
  * SPRINGLINE_OK.
  */
 int springline_step(springline_controller *controller, const springline_reference *reference,
