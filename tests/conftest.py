@@ -4,7 +4,7 @@ import os
 import shutil
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import ClassVar
 
 import casadi as ca
@@ -136,16 +136,14 @@ class ThreeLinks(_PlanarArm):
 OTHER_ARMS: tuple[Mechanism, ...] = (OneLink(), ThreeLinks(), Slider())
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _other_arms() -> Iterator[None]:
+@pytest.fixture
+def other_arms(monkeypatch: pytest.MonkeyPatch) -> None:
     """Arms with one and with three joints, known by name as the packaged ones are."""
-    MECHANISMS.update({arm.name: arm for arm in OTHER_ARMS})
-    yield
     for arm in OTHER_ARMS:
-        del MECHANISMS[arm.name]
+        monkeypatch.setitem(MECHANISMS, arm.name, arm)
 
 
 @pytest.fixture(params=[arm.name for arm in OTHER_ARMS if arm.name != "slider"])
-def other_arm(request: pytest.FixtureRequest) -> str:
+def other_arm(request: pytest.FixtureRequest, other_arms: None) -> str:
     """The name of an arm that is not the paper's."""
     return str(request.param)

@@ -11,6 +11,8 @@ from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, k
 from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.system import SignalShape, Structure
 
+pytestmark = pytest.mark.usefixtures("other_arms")
+
 OMEGA, AMPLITUDE, DURATION = 7.0, 0.3, 1.0
 VALUES = {
     "base_motion.shake.0.amplitude": AMPLITUDE,

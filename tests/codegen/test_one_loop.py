@@ -24,6 +24,8 @@ from springline.model.mechanisms import MECHANISMS
 from springline.model.quantities import Q1, Quantity
 from springline.model.system import SignalShape, Structure
 
+pytestmark = pytest.mark.usefixtures("other_arms")
+
 STEP, STEPS, HOLD = 1e-4, 400, 10
 
 

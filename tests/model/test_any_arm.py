@@ -7,6 +7,8 @@ from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import Joint, Parameter
 from springline.model.system import SignalShape, Structure, System, control_parameters
 
+pytestmark = pytest.mark.usefixtures("other_arms")
+
 SHAKEN = SignalShape("sine", (1, 1, 1))
 
 

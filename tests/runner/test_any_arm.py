@@ -12,6 +12,8 @@ from springline.runner import batch, load_scenario, simulate
 from springline.runner.cli import app
 from springline.runner.errors import InputError
 
+pytestmark = pytest.mark.usefixtures("other_arms")
+
 SHORT = {"simulation.duration": 0.5, "simulation.step": 2e-4}
 
 
