@@ -181,7 +181,7 @@ def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         ),
         "provenance": "  \n".join(provenance(export)),
         "field_table": "\n".join(
-            f"| `springline_{name}` | `{field.name}` | {field.unit} |"
+            f"| `springline_{name}` | `{field.name}` | {field.unit} | {field.meaning} |"
             for name, members in interface.structures.items()
             for field in members
         ),
