@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from springline.codegen.numbers import shown
 
 _LINE = 120  # characters
-_NUMBERS = {"int64_t": ctypes.c_int64, "double": ctypes.c_double}
+_Kind = type[ctypes.c_int64 | ctypes.c_double | ctypes.c_void_p]
+_KINDS: dict[str, _Kind] = {"int64_t": ctypes.c_int64, "double": ctypes.c_double, "*": ctypes.c_void_p}
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,9 +21,9 @@ class Member:
     meaning: str
 
     @property
-    def ctype(self) -> type[ctypes.c_int64 | ctypes.c_double | ctypes.c_void_p]:
+    def ctype(self) -> _Kind:
         """The same for ctypes. Raises KeyError for a type that is none of these."""
-        return ctypes.c_void_p if self.kind.endswith("*") else _NUMBERS[self.kind]
+        return _KINDS["*" if self.kind.endswith("*") else self.kind]
 
     @property
     def declaration(self) -> str:
