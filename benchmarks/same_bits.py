@@ -63,7 +63,8 @@ def difference(ours: pa.Table, theirs: pa.Table) -> str:
         if differs.any():
             row = int(np.argmax(differs))
             most = float(np.max(np.abs(x - y)[differs]))
-            return f"{name} from row {row} on ({float(x[row])!r}, and {float(y[row])!r} in the other), by at most {most:.3g}"
+            first = f"{float(x[row])!r}, and {float(y[row])!r} in the other"
+            return f"{name} from row {row} on ({first}), by at most {most:.3g}"
     return ""
 
 
