@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from springline.benchmarks import harness, math_speed, problem, roofline, same_bits, work_precision
@@ -160,6 +161,29 @@ def test_a_bit_that_differs_is_found_with_its_column_and_size() -> None:
     assert "q1" in same_bits.difference(ours, ours.set_column(1, "q1", [[-0.0, math.nan]]))
     assert "status" in same_bits.difference(ours, ours.set_column(2, "status", [["ok", "diverged"]]))
     assert "2 rows, and 1 in the other" in same_bits.difference(ours, ours.slice(0, 1))
+
+
+def test_checkouts_that_differ_end_the_comparison_with_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / ".venv" / "bin").mkdir(parents=True)
+    (tmp_path / ".venv" / "bin" / "python").touch()
+    monkeypatch.setattr(sys, "argv", ["same_bits", str(tmp_path)])
+    monkeypatch.setattr(same_bits, "packaged_scenarios", lambda: ("one",))
+    for value, expected in ((1.0, 0), (1.5, 1)):
+
+        def results(
+            interpreter: Path, folder: Path, names: tuple[str, ...], theirs: Path = tmp_path, value: float = value
+        ) -> None:
+            for name in names:
+                (folder / name).mkdir()
+                table = pa.table({"q1": [value if interpreter.is_relative_to(theirs) else 1.0]})
+                for file in ("trajectory", "metrics"):
+                    pq.write_table(table, folder / name / f"{file}.parquet")
+
+        monkeypatch.setattr(same_bits, "results", results)
+        assert same_bits.main() == expected
+    assert "q1 from row 0 on (1.0, and 1.5 in the other), by at most 0.5" in capsys.readouterr().out
 
 
 def test_a_checkout_without_a_scenario_is_no_difference(tmp_path: Path) -> None:
