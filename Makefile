@@ -13,7 +13,7 @@ PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-bui
 SHIPPED = $(shell find model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format math-accuracy firmware bench clean FORCE
+.PHONY: help install reproduce test test-full lint format docs-tables math-accuracy firmware bench clean FORCE
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
@@ -38,6 +38,9 @@ lint: .venv/installed ## ruff and mypy
 format: .venv/installed ## let ruff put the code in order
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
+
+docs-tables: .venv/installed ## print the tables of columns and metrics in docs/scenarios.md anew
+	$(BIN)/python -m runner.docs_tables --write
 
 math-accuracy: .venv/installed ## measure the elementary functions against mpmath; writes the table in docs/math.md
 	$(BIN)/python -m benchmarks.math_accuracy --write

@@ -24,12 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen import toolchain
+from springline.runner.docs_tables import put
 
 Floats = NDArray[np.float64]
 Sampler = Callable[[np.random.Generator, int], tuple[Floats, ...]]
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "math.md"
-BEGIN, END = "<!-- table: begin -->\n", "<!-- table: end -->\n"
 PRECISION = 160  # bits of the reference; a result can cancel, never this much
 
 TINY, SMALLEST_NORMAL, LARGEST = math.ulp(0.0), sys.float_info.min, sys.float_info.max
@@ -281,9 +281,7 @@ def main() -> int:
         sys.stdout.write(f"{row.case.function:10} {row.case.range:32} {row.error:6.3f}  {where}\n")
         sys.stdout.flush()
     if options.write:
-        before, _, rest = DOCUMENT.read_text().partition(BEGIN)
-        _, _, after = rest.partition(END)
-        DOCUMENT.write_text(before + BEGIN + table(rows, options.samples) + END + after)
+        DOCUMENT.write_text(put(DOCUMENT.read_text(), "table", table(rows, options.samples)))
     return int(max(row.error for row in rows) > 2.0)
 
 

@@ -182,7 +182,7 @@ def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "sampling": f"{export.system.mechanism.sampling}\n" if export.system.mechanism.sampling else "",
         "provenance": "  \n".join(provenance(export)),
         "field_table": "\n".join(
-            f"| `springline_{name}` | `{field.name}` | {field.unit} |"
+            f"| `springline_{name}` | `{field.name}` | {field.unit} | {field.meaning} |"
             for name, members in interface.structures.items()
             for field in members
         ),

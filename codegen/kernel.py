@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen import toolchain
+from springline.codegen.job import STATUSES, Job, Struct
 from springline.codegen.kernel_source import KernelSource, print_kernel
 from springline.codegen.kernel_spec import ONE_RUN, Engine, KernelOptions, KernelSpec
 from springline.codegen.memory import memory
-from springline.codegen.numbers import doubles, real, shown, whole
+from springline.codegen.numbers import doubles, real, whole
 from springline.codegen.program import Program, program
 from springline.codegen.tables import Table
 from springline.model import quantities
@@ -48,8 +49,8 @@ Floats = NDArray[np.float64]
 METRICS = tuple(metric.name for metric in quantities.METRICS)
 """Names of the metrics of each joint, in their order."""
 
-STATUS = ("ok", "diverged", "out_of_bounds", "stopped")
-"""In the order of simulate.h."""
+STATUS = tuple(STATUSES)
+"""How a run ends, by number."""
 
 CHATTERING = 20.0
 """1/s: a command whose `chatter` is larger chatters. Clean runs have 0 to 1.3."""
@@ -140,58 +141,15 @@ class Watch:
     stop: ctypes.c_int32 = field(default_factory=ctypes.c_int32)
 
 
-class _Struct(ctypes.Structure):
-    """A C struct made of named values. Raises ValueError for one that C would hold as another, as ctypes does not."""
-
-    def __init__(self, **values: object) -> None:
-        super().__init__(**values)
-        for name, *_ in self._fields_:
-            given = values.pop(name)
-            held = getattr(self, name)
-            if held != given:
-                raise ValueError(f"{name} is {shown(given)}, which C would take for {held!r}")
-        if values:
-            raise TypeError(f"{type(self).__name__} has no {', '.join(values)}")
-
-
-class _Table(_Struct):
-    _fields_ = [
+class _Table(Struct):
+    _fields_ = (
         ("t0", ctypes.c_double),
         ("dt", ctypes.c_double),
         ("intervals", ctypes.c_int64),
         ("channels", ctypes.c_int64),
         ("periodic", ctypes.c_int64),
         ("coefficients", ctypes.c_void_p),
-    ]
-
-
-class _Job(_Struct):
-    _fields_ = [
-        ("first", ctypes.c_int64),
-        ("last", ctypes.c_int64),
-        ("steps", ctypes.c_int64),
-        ("start_time", ctypes.c_double),
-        ("step", ctypes.c_double),
-        ("bound", ctypes.c_double),
-        ("hold", ctypes.c_int64),
-        ("output_every", ctypes.c_int64),
-        ("response_band", ctypes.c_double),
-        ("settling_band", ctypes.c_double),
-        ("response_error", ctypes.c_double),
-        ("settling_error", ctypes.c_double),
-        ("parameters", ctypes.c_void_p),
-        ("tables", ctypes.c_void_p),
-        ("metrics", ctypes.c_void_p),
-        ("final_state", ctypes.c_void_p),
-        ("end_time", ctypes.c_void_p),
-        ("status", ctypes.c_void_p),
-        ("quantity", ctypes.c_void_p),
-        ("trajectory", ctypes.c_void_p),
-        ("rows", ctypes.c_void_p),
-        ("capacity", ctypes.c_int64),
-        ("progress", ctypes.c_void_p),
-        ("stop", ctypes.c_void_p),
-    ]
+    )
 
 
 # What springline_layout says, in its order.
@@ -229,7 +187,7 @@ class Kernel:
         self._states, self._columns = system.x.numel(), len(system.trajectory)
         self.width = _checked_layout(
             handle.springline_layout,
-            ctypes.sizeof(_Job),
+            ctypes.sizeof(Job),
             ctypes.sizeof(_Table),
             len(self.parameters),
             len(system.tables),
@@ -291,7 +249,7 @@ class Kernel:
             trajectory=np.full((runs, rows, self._columns), np.nan) if rows else None,
             rows=np.zeros(runs, np.int64) if rows else None,
         )
-        job = _Job(
+        job = Job(
             first=0,
             last=runs,
             steps=settings.steps,

@@ -10,13 +10,14 @@ from functools import lru_cache
 from importlib import resources
 
 from springline.codegen import casadi_c, lanes, toolchain
+from springline.codegen.job import job_header
 from springline.codegen.kernel_spec import KernelOptions, KernelSpec
 from springline.codegen.program import Program
 from springline.codegen.stepping import kernel_update
 from springline.model.base import COORDINATES
 from springline.model.quantities import METRICS
 
-_RUNTIME = ("loop.c", "metrics.h", "simulate.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
+_RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +127,6 @@ def _flags(options: KernelOptions) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def runtime_sources() -> dict[str, str]:
-    """The C files of codegen/runtime/ by name."""
+    """The C that all kernels share, by file name."""
     folder = resources.files("springline.codegen") / "runtime"
-    return {name: (folder / name).read_text() for name in _RUNTIME}
+    return {"simulate.h": job_header(), **{name: (folder / name).read_text() for name in _RUNTIME}}

@@ -28,6 +28,7 @@ STATUS = (
 )
 """Statuses in the order of their values: name, and what happened and what to do about it."""
 
+_LINE = 120  # characters
 _MATH_STACK = 160  # bytes below the deepest elementary function, as measured on Cortex-M7
 
 
@@ -254,9 +255,11 @@ class TypedInterface:
         members = self.structures[name]
         declarations = [f"{'int32_t' if field.integer else 'springline_real'} {field.name};" for field in members]
         width = max(map(len, declarations))
-        return "\n".join(
-            f"  {text:{width}} /* {field.unit} */" for text, field in zip(declarations, members, strict=True)
-        )
+        lines = [
+            (f"  {text:{width}} /* {field.unit}", f"; {field.meaning}")
+            for text, field in zip(declarations, members, strict=True)
+        ]
+        return "\n".join(f"{start}{rest if len(start + rest) + 3 <= _LINE else ''} */" for start, rest in lines)
 
     def _zeros(self, name: str) -> str:
         zero = literal(0.0, self.export.real)

@@ -290,9 +290,14 @@ class System:
         return (U_S, U_F) if self.structure.drive == "elastic" else (U_S,)
 
     @property
+    def columns(self) -> tuple[Quantity, ...]:
+        """What a trajectory shows, in the order of the loop's rows."""
+        return (T, *self.drive.state, Q1D, E, SIGMA, U, B)
+
+    @property
     def trajectory(self) -> tuple[Entry, ...]:
-        """Columns of a trajectory, in the order of the loop's rows."""
-        return entries((T, *self.drive.state, Q1D, E, SIGMA, U, B), self.joints)
+        """Columns of a trajectory: those of all its quantities."""
+        return entries(self.columns, self.joints)
 
     @property
     def metrics(self) -> tuple[Entry, ...]:

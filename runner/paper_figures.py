@@ -9,17 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from springline.model.base import COORDINATES
+from springline.model.mechanisms import MECHANISMS
+from springline.model.parameters import Joint
+from springline.model.quantities import DQ1, DQ1D, Q1, Q1D, SIGMA, E, Quantity
 from springline.runner.block_diagram import block_diagram
 from springline.runner.measured import Measured
 from springline.runner.paper_cases import CASES, LAWS
 from springline.runner.paper_runs import LAYERS, LIMITS, LINEAR_GAIN, Study
-from springline.runner.plots import LINES, PAGE, REFERENCE, Line, draw, house_style, label, legend_above
+from springline.runner.plots import LINES, PAGE, REFERENCE, TIME, Line, draw, house_style, label, legend_above
 
 Curves = Sequence[tuple[str, Measured, Line]]
 
@@ -47,29 +52,56 @@ class PaperFigure:
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
-    """What a group's figure shows: its column and axis label, the wished course, the error, and their units."""
+class Shown:
+    """What a group's figure shows of a joint: a quantity with its wished course, or (without one) its error.
 
-    column: str
+    title, error_title  axis labels of what is shown and of the error
+    quantity            Q1 or DQ1
+    error               name of the error's column, before "_<joint>"
+    wished              None where the error itself is shown
+    """
+
     title: str
-    unit: str
-    wished: str
-    error: str
     error_title: str
+    joint: Joint
+    quantity: Quantity
+    error: str
+    wished: Quantity | None = None
+
+    @property
+    def column(self) -> str:
+        """What is drawn."""
+        return f"{self.quantity.name}_{self.joint.name}" if self.wished else self.error_column
+
+    @property
+    def desired(self) -> str:
+        """The wished course, "" where there is none."""
+        return f"{self.wished.name}_{self.joint.name}" if self.wished else ""
+
+    @property
+    def error_column(self) -> str:
+        """The error."""
+        return f"{self.error}_{self.joint.name}"
+
+    @property
+    def unit(self) -> str:
+        """Of all three."""
+        return unit_of(self.quantity, self.joint)
 
 
-POSITION = Quantity("q1_lift", "lift position", "m", "q1d_lift", "e_lift", "position error")
-ANGLE = Quantity("q1_rotation", "rotation angle", "rad", "q1d_rotation", "e_rotation", "angle error")
-VELOCITY = Quantity("dq1_lift", "lift velocity", "m/s", "dq1d_lift", "velocity_error_lift", "velocity error")
-SPIN = Quantity(
-    "dq1_rotation", "angular velocity", "rad/s", "dq1d_rotation", "velocity_error_rotation", "angular vel. error"
-)
-VELOCITY_ERROR = Quantity(
-    "velocity_error_lift", "lift velocity error", "m/s", "", "velocity_error_lift", "velocity error"
-)
-SPIN_ERROR = Quantity(
-    "velocity_error_rotation", "angular velocity error", "rad/s", "", "velocity_error_rotation", "angular vel. error"
-)
+def unit_of(quantity: Quantity, joint: Joint) -> str:
+    """Unit of a quantity of this joint."""
+    return quantity.entries([joint])[0].unit
+
+
+JOINTS = LIFT, ROTATION = MECHANISMS["transfer_manipulator"].joints
+
+POSITION = Shown("lift position", "position error", LIFT, Q1, E.name, Q1D)
+ANGLE = Shown("rotation angle", "angle error", ROTATION, Q1, E.name, Q1D)
+VELOCITY = Shown("lift velocity", "velocity error", LIFT, DQ1, "velocity_error", DQ1D)
+SPIN = Shown("angular velocity", "angular vel. error", ROTATION, DQ1, "velocity_error", DQ1D)
+VELOCITY_ERROR = Shown("lift velocity error", "velocity error", LIFT, DQ1, "velocity_error")
+SPIN_ERROR = Shown("angular velocity error", "angular vel. error", ROTATION, DQ1, "velocity_error")
 
 START = {1: 0.4, 2: 2.0, 3: 0.4}
 """What the middle part of a group's figures shows, s."""
@@ -77,7 +109,6 @@ START = {1: 0.4, 2: 2.0, 3: 0.4}
 SETTLED = {1: 0.5, 2: 2.0, 3: 0.5}
 """From when on its right part shows errors, s."""
 
-_MILLI = {"m": "mm", "rad": "mrad", "m/s": "mm/s", "rad/s": "mrad/s"}
 _WIDE = (PAGE, 2.35)
 
 
@@ -91,23 +122,23 @@ def _parts(ratios: Sequence[float], height: float = _WIDE[1]) -> tuple[Figure, l
     return figure, list(figure.subplots(1, len(ratios), width_ratios=list(ratios), squeeze=False)[0])
 
 
-def _group(group: int, quantity: Quantity) -> Callable[[Study], Figure]:
+def _group(group: int, shown: Shown) -> Callable[[Study], Figure]:
     def drawn(study: Study) -> Figure:
         curves = _curves(study, group)
         figure, (whole, start, rest) = _parts((1.3, 1, 1.3))
         for axes in (whole, start):
             for name, run, line in curves:
-                draw(axes, run["t"], run[quantity.column], name, **line)
-            if quantity.wished:
-                draw(axes, curves[0][1]["t"], curves[0][1][quantity.wished], "desired", **REFERENCE)
-            axes.set_xlabel(label("time", "s"))
-        whole.set_ylabel(label(quantity.title, quantity.unit))
+                draw(axes, run["t"], run[shown.column], name, **line)
+            if shown.desired:
+                draw(axes, curves[0][1]["t"], curves[0][1][shown.desired], "desired", **REFERENCE)
+            axes.set_xlabel(TIME)
+        whole.set_ylabel(label(shown.title, shown.unit))
         start.set_xlim(0, START[group])
         start.set_title(f"first {START[group]:g} s")
         for name, run, line in curves:
             late = run["t"] >= SETTLED[group]
-            draw(rest, run["t"][late], 1e3 * run[quantity.error][late], name, **line)
-        rest.set(xlabel=label("time", "s"), ylabel=label(quantity.error_title, _MILLI[quantity.unit]))
+            draw(rest, run["t"][late], 1e3 * run[shown.error_column][late], name, **line)
+        rest.set(xlabel=TIME, ylabel=label(shown.error_title, f"m{shown.unit}"))
         rest.set_title(f"after {SETTLED[group]:g} s")
         legend_above(figure, columns=len(curves) + 1)
         return figure
@@ -115,28 +146,28 @@ def _group(group: int, quantity: Quantity) -> Callable[[Study], Figure]:
     return drawn
 
 
-def _flutter(quantity: Quantity) -> Callable[[Study], Figure]:
+def _flutter(shown: Shown) -> Callable[[Study], Figure]:
     """Group 4: the run without fast control as far as the axes go, and how its distance to the other run grows."""
 
     def drawn(study: Study) -> Figure:
         (on_name, on, on_line), (off_name, off, off_line) = _curves(study, 4)
         figure, (whole, start, growth) = _parts((1.3, 1.3, 1))
-        low, high = float(np.min(on[quantity.column])), float(np.max(on[quantity.column]))
+        low, high = float(np.min(on[shown.column])), float(np.max(on[shown.column]))
         room = 0.6 * (high - low)
         for axes in (whole, start):
-            draw(axes, off["t"], off[quantity.column], off_name, **_solid(off_line, 0.6))
-            draw(axes, on["t"], on[quantity.column], on_name, **on_line)
-            draw(axes, on["t"], on[quantity.wished], "desired", **REFERENCE)
+            draw(axes, off["t"], off[shown.column], off_name, **_solid(off_line, 0.6))
+            draw(axes, on["t"], on[shown.column], on_name, **on_line)
+            draw(axes, on["t"], on[shown.desired], "desired", **REFERENCE)
             axes.axvline(off.end, color="0.4", linewidth=0.8, linestyle=":", label=f"left its bound, {off.end:.2f} s")
-            axes.set(xlabel=label("time", "s"), ylim=(low - room, high + room))
-        whole.set(ylabel=label(quantity.title, quantity.unit), xlim=(0, on.end))
+            axes.set(xlabel=TIME, ylim=(low - room, high + room))
+        whole.set(ylabel=label(shown.title, shown.unit), xlim=(0, on.end))
         start.set_xlim(0, off.end * 1.1)
         start.set_title("until it leaves its bound")
         rows = min(len(off["t"]), len(on["t"]))
-        gap = np.abs(off[quantity.column][:rows] - on[quantity.column][:rows])
+        gap = np.abs(off[shown.column][:rows] - on[shown.column][:rows])
         gap = np.where(gap > 0, gap, math.nan)
         draw(growth, off["t"][:rows], gap, **_solid(off_line, 0.6))
-        growth.set(yscale="log", xlabel=label("time", "s"), ylabel=label("|off − on|", quantity.unit))
+        growth.set(yscale="log", xlabel=TIME, ylabel=label("|off − on|", shown.unit))
         growth.set_ylim(bottom=float(np.nanmax(gap)) * 1e-8)
         growth.set_title("distance between the runs")
         legend_above(figure, columns=4)
@@ -154,9 +185,11 @@ def _reaching_laws(study: Study) -> Figure:
         far.plot(sigma, np.abs(rate(sigma)), label=LAWS[law], **line)
     near.axhline(0, color="0.5", linewidth=0.6)
     near.axvline(0, color="0.5", linewidth=0.6)
-    near.set(xlabel=label(r"$\sigma$", "m/s"), ylabel=label(r"$\dot\sigma$", "m/s²"))
+    sigma_unit, rate_unit = unit_of(SIGMA, LIFT), f"{LIFT.unit}/s^2"
+    near.set(xlabel=label(f"${SIGMA.symbol}$", sigma_unit), ylabel=label(rf"$\dot{SIGMA.symbol}$", rate_unit))
     near.set_title("phase plane")
-    far.set(xscale="log", yscale="log", xlabel=label(r"$|\sigma|$", "m/s"), ylabel=label(r"$|\dot\sigma|$", "m/s²"))
+    far.set(xscale="log", yscale="log", xlabel=label(f"$|{SIGMA.symbol}|$", sigma_unit))
+    far.set_ylabel(label(rf"$|\dot{SIGMA.symbol}|$", rate_unit))
     far.set_title("the same on logarithmic scales")
     legend_above(figure, columns=3)
     return figure
@@ -164,12 +197,12 @@ def _reaching_laws(study: Study) -> Figure:
 
 def _linear_surface(study: Study) -> Figure:
     figure, panes = _parts((1, 1), 2.5)
-    for axes, joint, unit in zip(panes, ("lift", "rotation"), ("m/s", "rad/s"), strict=True):
+    for axes, joint in zip(panes, JOINTS, strict=True):
         for (law, run), line in zip(study.evidence.linear.items(), LINES, strict=False):
             early = run["t"] <= 1.5
-            draw(axes, run["t"][early], run[f"sigma_{joint}"][early], LAWS[law], **line)
-        axes.set(xlabel=label("time", "s"), ylabel=label(r"$\sigma$", unit))
-        axes.set_title(joint)
+            draw(axes, run["t"][early], run[f"{SIGMA.name}_{joint.name}"][early], LAWS[law], **line)
+        axes.set(xlabel=TIME, ylabel=label(f"${SIGMA.symbol}$", unit_of(SIGMA, joint)))
+        axes.set_title(joint.name)
     legend_above(figure, columns=3)
     return figure
 
@@ -177,16 +210,12 @@ def _linear_surface(study: Study) -> Figure:
 def _base_oscillations(study: Study) -> Figure:
     figure = Figure(figsize=(PAGE, 3.3))
     rows = figure.subplots(3, 1, sharex=True)
-    for axes, (name, run, line), (column, unit, scale) in zip(
-        rows,
-        _curves(study, 1),
-        (("y_r1", "m", 1.0), ("theta_1z", "°", 180 / math.pi), ("theta_1x", "°", 180 / math.pi)),
-        strict=True,
-    ):
-        draw(axes, run["t"], scale * run[column], name, **_solid(line))
+    for axes, (name, run, line), coordinate in zip(rows, _curves(study, 1), COORDINATES, strict=True):
+        unit, scale = ("°", 180 / math.pi) if coordinate.unit == "rad" else (coordinate.unit, 1.0)
+        draw(axes, run["t"], scale * run[coordinate.symbol], name, **_solid(line))
         axes.set_ylabel(label(name, unit))
         axes.margins(y=0.12)
-    rows[-1].set_xlabel(label("time", "s"))
+    rows[-1].set_xlabel(TIME)
     figure.align_ylabels()
     return figure
 
@@ -194,13 +223,13 @@ def _base_oscillations(study: Study) -> Figure:
 def _literal(study: Study) -> Figure:
     """E3, E4: the printed law with a limit only on its acceleration, beside the packaged boundary layer."""
     figure, panes = _parts((1, 1), 2.4)
-    for axes, joint, unit in zip(panes, ("lift", "rotation"), ("m", "rad"), strict=True):
+    for axes, joint in zip(panes, JOINTS, strict=True):
         for name, (run, _), line in (
             ("δ = 0, $a_{max}$ = 200", study.literal["limited"], _solid(LINES[1], 0.6)),
             ("δ = 0.05, $a_{max}$ = 200", study.layers["0.05"], _solid(LINES[0])),
         ):
-            draw(axes, run["t"], run[f"e_{joint}"], name, **line)
-        axes.set(xlabel=label("time", "s"), ylabel=label(f"{joint} error", unit))
+            draw(axes, run["t"], run[f"{E.name}_{joint.name}"], name, **line)
+        axes.set(xlabel=TIME, ylabel=label(f"{joint.name} error", unit_of(E, joint)))
     legend_above(figure)
     return figure
 
@@ -217,8 +246,10 @@ def _readings(study: Study) -> Figure:
         part = (run["t"] >= 3.5) & (run["t"] <= 3.55)
         draw(detail, run["t"][part], run["sigma_lift"][part], name, **_solid(line))
     largest = 1.15 * study.readings["base"][0].largest("sigma_lift")
-    whole.set(xlabel=label("time", "s"), ylabel=label(r"$\sigma$ of the lift", "m/s"), ylim=(-largest, largest))
-    detail.set(xlabel=label("time", "s"))
+    whole.set(
+        xlabel=TIME, ylabel=label(f"${SIGMA.symbol}$ of the lift", unit_of(SIGMA, LIFT)), ylim=(-largest, largest)
+    )
+    detail.set(xlabel=TIME)
     detail.set_title("0.05 s of it")
     legend_above(figure)
     return figure
@@ -238,7 +269,7 @@ def _decisions(study: Study) -> Figure:
         axes.axhline(0.05 * 0.8, label="5 % of the initial error", **REFERENCE)
         axes.set(xscale="log", yscale="log")
         axes.margins(x=0.05)
-    left.set(xlabel="δ [m or rad]", ylabel=label("steady-state error, lift", "m"))
+    left.set(xlabel="δ [m or rad]", ylabel=label("steady-state error, lift", unit_of(E, LIFT)))
     right.set(xlabel="$a_{max}$ [m/s² or rad/s²]")
     legend_above(figure)
     return figure
@@ -257,12 +288,12 @@ def _group_figures(
     first: int,
     group: int,
     intro: str,
-    quantities: Mapping[str, Quantity],
-    how: Callable[[Quantity], Callable[[Study], Figure]],
+    shown_by_name: Mapping[str, Shown],
+    how: Callable[[Shown], Callable[[Study], Figure]],
 ) -> tuple[PaperFigure, ...]:
     return tuple(
-        PaperFigure(_title(number), f"**Figure {number}.** {intro} {name}.", group, how(quantity))
-        for number, (name, quantity) in enumerate(quantities.items(), first)
+        PaperFigure(_title(number), f"**Figure {number}.** {intro} {name}.", group, how(shown))
+        for number, (name, shown) in enumerate(shown_by_name.items(), first)
     )
 
 
@@ -292,10 +323,10 @@ FIGURES: tuple[PaperFigure, ...] = (
         1,
         _base_oscillations,
     ),
-    *_group_figures(8, 1, "Group 1, variable power log law under each oscillation:", _FOUR, lambda q: _group(1, q)),
-    *_group_figures(12, 2, "Group 2, the three laws under shake:", _FOUR, lambda q: _group(2, q)),
+    *_group_figures(8, 1, "Group 1, variable power log law under each oscillation:", _FOUR, partial(_group, 1)),
+    *_group_figures(12, 2, "Group 2, the three laws under shake:", _FOUR, partial(_group, 2)),
     *_group_figures(
-        16, 3, "Group 3, payload of the plant changed, controller unchanged, under shake:", _SIX, lambda q: _group(3, q)
+        16, 3, "Group 3, payload of the plant changed, controller unchanged, under shake:", _SIX, partial(_group, 3)
     ),
     *_group_figures(22, 4, "Group 4, fast control on and off, under shake:", _FOUR, _flutter),
 )

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from springline.model.base import COORDINATES, BaseCoordinate
 from springline.model.parameters import Joint
+from springline.model.quantities import Q1, Q2, SIGMA, E, Quantity, T, U
 from springline.runner.scenario import Scenario
 from springline.runner.simulate import Result
 from springline.runner.storage import units
@@ -104,6 +105,17 @@ def label(quantity: str, unit: str) -> str:
     return quantity if unit in {"", "1"} else f"{quantity} [{shown}]"
 
 
+def symbol(quantity: Quantity) -> str:
+    """A quantity's symbol in a label: plain Unicode where that can write it, else TeX's mathematics."""
+    plain = quantity.symbol
+    for tex, text in ((r"\sigma", "σ"), ("_1", "₁"), ("_2", "₂")):
+        plain = plain.replace(tex, text)
+    return plain if plain.isalnum() else f"${quantity.symbol}$"
+
+
+TIME = label(T.meaning, T.unit)
+
+
 def draw(axes: Axes, t: Floats, y: Floats, name: str = "", **style: Any) -> None:
     """Plot y over t; of a long record the extremes of each of 1500 intervals, which look the same and keep files small.
 
@@ -166,9 +178,9 @@ def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
     figures: dict[str, Callable[[_Run], Figure]] = {
         "tracking": _tracking,
         "error": _error,
-        "force": _lines("force U", "U"),
-        "sliding": _lines("sliding σ", "sigma"),
-        "springs": _lines("spring q₂ − q₁", "q2", less="q1"),
+        "force": _lines("force", U),
+        "sliding": _lines("sliding", SIGMA),
+        "springs": _lines("spring", Q2, less=Q1),
     }
     if run.moving:
         figures["base_motion"] = _base_motion
@@ -222,18 +234,18 @@ class _Run:
         return self._units[column]
 
 
-def _joint_panels(run: _Run, quantity: str, column: str) -> tuple[Figure, list[tuple[Axes, Joint]]]:
-    """One panel a joint over time, labelled with the unit of `column`."""
+def _joint_panels(run: _Run, text: str, quantity: Quantity) -> tuple[Figure, list[tuple[Axes, Joint]]]:
+    """One panel a joint over time, labelled with the joint, the text and the unit of the quantity."""
     figure, grid = panels(len(run.joints))
     pairs = list(zip(grid[:, 0], run.joints, strict=True))
     for axes, joint in pairs:
-        axes.set_ylabel(label(f"{joint.name}\n{quantity}", run.unit(f"{column}_{joint.name}")))
+        axes.set_ylabel(label(f"{joint.name}\n{text}", run.unit(f"{quantity.name}_{joint.name}")))
     _time_axis(run, figure)
     return figure, pairs
 
 
 def _time_axis(run: _Run, figure: Figure) -> None:
-    figure.axes[-1].set_xlabel(label("time", "s"))
+    figure.axes[-1].set_xlabel(TIME)
     if run.status != "ok":
         stopped = f"{run.status.replace('_', ' ')} at {run.t[-1]:g} s"
         for axes in figure.axes:
@@ -241,9 +253,9 @@ def _time_axis(run: _Run, figure: Figure) -> None:
 
 
 def _tracking(run: _Run) -> Figure:
-    figure, pairs = _joint_panels(run, "coordinate", "q1")
+    figure, pairs = _joint_panels(run, "coordinate", Q1)
     for axes, joint in pairs:
-        draw(axes, run.t, run[f"q1_{joint.name}"], "link q₁", **LINES[0])
+        draw(axes, run.t, run[f"q1_{joint.name}"], f"link {symbol(Q1)}", **LINES[0])
         draw(axes, run.t, run[f"q1d_{joint.name}"], "reference", **REFERENCE)
     legend_above(figure)
     return figure
@@ -251,7 +263,7 @@ def _tracking(run: _Run) -> Figure:
 
 def _error(run: _Run) -> Figure:
     """The error with the bands that define response and settling time, and these times."""
-    figure, pairs = _joint_panels(run, "error e", "e")
+    figure, pairs = _joint_panels(run, f"error {symbol(E)}", E)
     response, settling = run.bands
     for axes, joint in pairs:
         e = run[f"e_{joint.name}"]
@@ -259,7 +271,7 @@ def _error(run: _Run) -> Figure:
         for (band, limit), shade in ((response, "0.90"), (settling, "0.78")):
             half = band * start + limit
             if half:
-                label = f"±{100 * band:g} % of |e(0)|" if band else f"±{limit:g} {joint.unit}"
+                label = f"±{100 * band:g} % of |{symbol(E)}(0)|" if band else f"±{limit:g} {joint.unit}"
                 axes.axhspan(-half, half, color=shade, linewidth=0, label=label)
         draw(axes, run.t, e, "error", **LINES[0])
         for metric, name, mark in (("response_time", "response time", "o"), ("settling_time", "settling time", "s")):
@@ -281,7 +293,7 @@ def _error(run: _Run) -> Figure:
 
 def _steady_state(run: _Run) -> Figure:
     """The error in the last quarter of the run, where a scale of its own shows it."""
-    figure, pairs = _joint_panels(run, "error e", "e")
+    figure, pairs = _joint_panels(run, f"error {symbol(E)}", E)
     late = run.t >= run.t[0] + 0.75 * (run.t[-1] - run.t[0])
     for axes, joint in pairs:
         draw(axes, run.t[late], run[f"e_{joint.name}"][late], "error", **LINES[0])
@@ -292,14 +304,15 @@ def _steady_state(run: _Run) -> Figure:
     return figure
 
 
-def _lines(quantity: str, column: str, less: str = "") -> Callable[[_Run], Figure]:
-    """A figure of one column per joint, or of the difference `column` - `less`."""
+def _lines(word: str, quantity: Quantity, less: Quantity | None = None) -> Callable[[_Run], Figure]:
+    """A figure of a quantity of each joint, or of the difference `quantity` - `less`."""
 
     def make(run: _Run) -> Figure:
-        figure, pairs = _joint_panels(run, quantity, column)
+        text = f"{word} {symbol(quantity)}" + (f" − {symbol(less)}" if less else "")
+        figure, pairs = _joint_panels(run, text, quantity)
         for axes, joint in pairs:
-            y = run[f"{column}_{joint.name}"]
-            draw(axes, run.t, y - run[f"{less}_{joint.name}"] if less else y, **LINES[0])
+            y = run[f"{quantity.name}_{joint.name}"]
+            draw(axes, run.t, y - run[f"{less.name}_{joint.name}"] if less else y, **LINES[0])
         legend_above(figure)
         return figure
 

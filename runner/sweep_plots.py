@@ -137,7 +137,9 @@ def _map(runs: _Runs) -> Figure:
             axes.set_xlabel(runs.title(x_key))
         grid[g, 0].set_ylabel(runs.title(y_key))
     if finite.size and mesh is not None:
-        bar = figure.colorbar(mesh, ax=grid.ravel().tolist(), label=label("settling time", "s"), shrink=0.8)
+        bar = figure.colorbar(
+            mesh, ax=grid.ravel().tolist(), label=label(_short("settling_time"), runs.units[columns[0]]), shrink=0.8
+        )
         if low > 0:
             _plain_decades(bar.ax.yaxis)
     for name, color in (("never settled", _NEVER), ("diverged", _STOPPED)):

@@ -9,9 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
-from springline.benchmarks import harness, math_speed, problem, roofline
+from springline.benchmarks import harness, math_speed, problem, roofline, same_bits, work_precision
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, handwritten_c, ours
 from springline.codegen.kernel import KernelOptions, kernel
@@ -152,3 +154,56 @@ def test_the_table_has_a_cell_for_every_column() -> None:
     assert {len(line) for line in lines} == {len(bench.COLUMNS)}
     assert lines[0][2:6] == ["12,346", "2", "1,975", "3e-12"]
     assert lines[1][2:] == ["–", "–", "–", "–", "–", "–", "absent"]
+
+
+def test_a_bit_that_differs_is_found_with_its_column_and_size() -> None:
+    ours = pa.table({"t": [0.0, 1.0], "q1": [0.0, math.nan], "status": ["ok", "ok"], "new": [1.0, 2.0]})
+    assert same_bits.difference(ours, ours.drop_columns("new")) == ""
+    last = ours.set_column(1, "q1", [[math.ulp(0.0), math.nan]])
+    assert same_bits.difference(ours, last).startswith("q1 from row 0 on (0.0, and 5e-324 in the other)")
+    assert "q1" in same_bits.difference(ours, ours.set_column(1, "q1", [[-0.0, math.nan]]))
+    assert "status" in same_bits.difference(ours, ours.set_column(2, "status", [["ok", "diverged"]]))
+    assert "2 rows, and 1 in the other" in same_bits.difference(ours, ours.slice(0, 1))
+
+
+def test_checkouts_that_differ_end_the_comparison_with_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / ".venv" / "bin").mkdir(parents=True)
+    (tmp_path / ".venv" / "bin" / "python").touch()
+    monkeypatch.setattr(sys, "argv", ["same_bits", str(tmp_path)])
+    monkeypatch.setattr(same_bits, "packaged_scenarios", lambda: ("one",))
+    for value, expected in ((1.0, 0), (1.5, 1)):
+
+        def results(
+            interpreter: Path, folder: Path, names: tuple[str, ...], theirs: Path = tmp_path, value: float = value
+        ) -> None:
+            for name in names:
+                (folder / name).mkdir()
+                table = pa.table({"q1": [value if interpreter.is_relative_to(theirs) else 1.0]})
+                for file in ("trajectory", "metrics"):
+                    pq.write_table(table, folder / name / f"{file}.parquet")
+
+        monkeypatch.setattr(same_bits, "results", results)
+        assert same_bits.main() == expected
+    assert "q1 from row 0 on (1.0, and 1.5 in the other), by at most 0.5" in capsys.readouterr().out
+
+
+def test_a_checkout_without_a_scenario_is_no_difference(tmp_path: Path) -> None:
+    for folder in ("ours", "theirs"):
+        (tmp_path / folder).mkdir()
+    text, equal = same_bits.compared(tmp_path / "ours", tmp_path / "theirs", "paper/nominal")
+    assert equal and "does not have it" in text
+
+
+def test_one_step_a_sample_of_high_order_beats_ten_of_rk4() -> None:
+    exact = work_precision.ours(*work_precision.REFERENCE)
+    high, low = (np.max(np.abs(work_precision.ours(*chosen) - exact)) for chosen in (("dop853", 1), ("rk4", 10)))
+    assert 0.0 < high < low < 1e-8
+
+
+def test_scipy_runs_the_same_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work_precision, "DURATION", 0.02)
+    q1, count = work_precision.scipys("DOP853", 1e-10)
+    assert q1.shape == (21, 2) and count > 12 * 20
+    assert np.max(np.abs(q1 - work_precision.ours(*work_precision.REFERENCE))) < 1e-12

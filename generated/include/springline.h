@@ -50,70 +50,70 @@ enum {
 
 /* Where the arm should be: joint coordinates q1d, their rates dq1d and accelerations ddq1d. */
 typedef struct springline_reference {
-  springline_real q1d_lift;       /* m */
-  springline_real q1d_rotation;   /* rad */
-  springline_real dq1d_lift;      /* m/s */
-  springline_real dq1d_rotation;  /* rad/s */
-  springline_real ddq1d_lift;     /* m/s^2 */
-  springline_real ddq1d_rotation; /* rad/s^2 */
+  springline_real q1d_lift;       /* m; reference of the joint coordinate (lift) */
+  springline_real q1d_rotation;   /* rad; reference of the joint coordinate (rotation) */
+  springline_real dq1d_lift;      /* m/s; reference of the joint rate (lift) */
+  springline_real dq1d_rotation;  /* rad/s; reference of the joint rate (rotation) */
+  springline_real ddq1d_lift;     /* m/s^2; reference of the joint acceleration (lift) */
+  springline_real ddq1d_rotation; /* rad/s^2; reference of the joint acceleration (rotation) */
 } springline_reference;
 
 /* Where the arm is: joint coordinates q1 and rates dq1, motor rates dq2 (reflected to the joint). */
 typedef struct springline_measurement {
-  springline_real q1_lift;      /* m */
-  springline_real q1_rotation;  /* rad */
-  springline_real dq1_lift;     /* m/s */
-  springline_real dq1_rotation; /* rad/s */
-  springline_real dq2_lift;     /* m/s */
-  springline_real dq2_rotation; /* rad/s */
+  springline_real q1_lift;      /* m; joint coordinate (lift) */
+  springline_real q1_rotation;  /* rad; joint coordinate (rotation) */
+  springline_real dq1_lift;     /* m/s; joint rate (lift) */
+  springline_real dq1_rotation; /* rad/s; joint rate (rotation) */
+  springline_real dq2_lift;     /* m/s; motor rate, reflected to the joint (lift) */
+  springline_real dq2_rotation; /* rad/s; motor rate, reflected to the joint (rotation) */
 } springline_measurement;
 
 /* What the motors should do. */
 typedef struct springline_command {
-  springline_real U_lift;     /* N */
-  springline_real U_rotation; /* N m */
+  springline_real U_lift;     /* N; command to the motor (lift) */
+  springline_real U_rotation; /* N m; command to the motor (rotation) */
 } springline_command;
 
 /* Why: tracking error e, sliding variable sigma, the two parts of U, and whether a limit was met (0 or 1): saturated
  * where U_max has limited U, a_limited where a_max has limited the acceleration that the reaching law wished. */
 typedef struct springline_diagnostics {
-  springline_real e_lift;         /* m */
-  springline_real e_rotation;     /* rad */
-  springline_real sigma_lift;     /* m/s */
-  springline_real sigma_rotation; /* rad/s */
-  springline_real U_s_lift;       /* N */
-  springline_real U_s_rotation;   /* N m */
-  springline_real U_f_lift;       /* N */
-  springline_real U_f_rotation;   /* N m */
-  int32_t saturated_lift;         /* 0 or 1 */
-  int32_t saturated_rotation;     /* 0 or 1 */
-  int32_t a_limited_lift;         /* 0 or 1 */
-  int32_t a_limited_rotation;     /* 0 or 1 */
+  springline_real e_lift;         /* m; tracking error (lift) */
+  springline_real e_rotation;     /* rad; tracking error (rotation) */
+  springline_real sigma_lift;     /* m/s; sliding variable (lift) */
+  springline_real sigma_rotation; /* rad/s; sliding variable (rotation) */
+  springline_real U_s_lift;       /* N; slow part of the command, before its limit (lift) */
+  springline_real U_s_rotation;   /* N m; slow part of the command, before its limit (rotation) */
+  springline_real U_f_lift;       /* N; fast part of the command, before its limit (lift) */
+  springline_real U_f_rotation;   /* N m; fast part of the command, before its limit (rotation) */
+  int32_t saturated_lift;         /* 0 or 1; whether U_max limits the command (lift) */
+  int32_t saturated_rotation;     /* 0 or 1; whether U_max limits the command (rotation) */
+  int32_t a_limited_lift;         /* 0 or 1; whether a_max limits the reaching law (lift) */
+  int32_t a_limited_rotation;     /* 0 or 1; whether a_max limits the reaching law (rotation) */
 } springline_diagnostics;
 
 /* The plant's state: joint coordinates q1, motor coordinates q2 (reflected to the joint), and their rates. */
 typedef struct springline_state {
-  springline_real q1_lift;      /* m */
-  springline_real q1_rotation;  /* rad */
-  springline_real dq1_lift;     /* m/s */
-  springline_real dq1_rotation; /* rad/s */
-  springline_real q2_lift;      /* m */
-  springline_real q2_rotation;  /* rad */
-  springline_real dq2_lift;     /* m/s */
-  springline_real dq2_rotation; /* rad/s */
+  springline_real q1_lift;      /* m; joint coordinate (lift) */
+  springline_real q1_rotation;  /* rad; joint coordinate (rotation) */
+  springline_real dq1_lift;     /* m/s; joint rate (lift) */
+  springline_real dq1_rotation; /* rad/s; joint rate (rotation) */
+  springline_real q2_lift;      /* m; motor coordinate, reflected to the joint (lift) */
+  springline_real q2_rotation;  /* rad; motor coordinate, reflected to the joint (rotation) */
+  springline_real dq2_lift;     /* m/s; motor rate, reflected to the joint (lift) */
+  springline_real dq2_rotation; /* rad/s; motor rate, reflected to the joint (rotation) */
 } springline_state;
 
 /* Motion of the base: shake y_r1, pitch theta_1z, roll theta_1x, their rates d_ and accelerations dd_. */
 typedef struct springline_base {
-  springline_real y_r1;        /* m */
-  springline_real theta_1z;    /* rad */
-  springline_real theta_1x;    /* rad */
-  springline_real d_y_r1;      /* m/s */
-  springline_real d_theta_1z;  /* rad/s */
-  springline_real d_theta_1x;  /* rad/s */
-  springline_real dd_y_r1;     /* m/s^2 */
-  springline_real dd_theta_1z; /* rad/s^2 */
-  springline_real dd_theta_1x; /* rad/s^2 */
+  springline_real y_r1;        /* m; motion of the base: shake */
+  springline_real theta_1z;    /* rad; motion of the base: pitch */
+  springline_real theta_1x;    /* rad; motion of the base: roll */
+  springline_real d_y_r1;      /* m/s; rate of the base: shake */
+  springline_real d_theta_1z;  /* rad/s; rate of the base: pitch */
+  springline_real d_theta_1x;  /* rad/s; rate of the base: roll */
+  springline_real dd_y_r1;     /* m/s^2; acceleration of the base: shake */
+  springline_real dd_theta_1z; /* rad/s^2; acceleration of the base: pitch */
+  springline_real dd_theta_1x; /* rad/s^2; acceleration of the base: roll */
 } springline_base;
 
 typedef struct springline_config {

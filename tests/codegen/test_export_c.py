@@ -15,12 +15,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from springline.codegen import typed
 from springline.codegen.api import generate_files
 from springline.codegen.export import bind
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.codegen.manifest import write_tree
 from springline.codegen.typed import STATUS
 from springline.model.parameters import Slot
+from springline.model.quantities import BASE, REFERENCE, SATURATED, SIGMA, E, U, entries
 from springline.runner import load_scenario
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
@@ -326,6 +328,26 @@ class Case:
 
     def step(self) -> str:
         return self.library("step", self.controller, self.reference, self.measurement, self.command, self.diagnostics)
+
+
+def test_header_and_readme_say_what_every_field_is(export: Folder) -> None:
+    folder, _ = export("baked")
+    header, readme = ((folder / file).read_text() for file in ("include/springline.h", "README.md"))
+    system = load_scenario("paper/nominal").system()
+    for entry in entries((*REFERENCE, *system.drive.state, U, E, SIGMA, SATURATED, *BASE), system.joints):
+        comment = rf"/\* {re.escape(entry.unit)}; {re.escape(entry.meaning)} \*/"
+        assert re.search(rf"^  \w+ {entry.name}; +{comment}$", header, re.MULTILINE), entry
+        assert f"| `{entry.name}` | {entry.unit} | {entry.meaning} |" in readme, entry
+
+
+def test_a_meaning_that_makes_a_line_too_long_is_left_to_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(typed, "_LINE", 64)
+    scenario = load_scenario("paper/nominal")
+    files, _ = generate_files(bind(scenario.structure(), scenario.values()))
+    header, readme = files["include/springline.h"].decode(), files["README.md"].decode()
+    assert "  springline_real q1d_lift;       /* m */\n" in header
+    assert "  springline_real q1_lift;      /* m; joint coordinate (lift) */\n" in header
+    assert "reference of the joint coordinate (lift)" in readme
 
 
 def test_sizes_are_what_the_readme_says(export: Folder, library: Callable[[str], Library]) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from springline.codegen import kernel as kernel_module
 from springline.codegen import kernel_source, toolchain
+from springline.codegen.job import JOB, Job
 from springline.codegen.kernel import (
     METRICS,
     MOST_STEPS,
@@ -571,13 +572,13 @@ def test_tables_without_an_interval_to_look_up_are_refused(t0: float, dt: float,
 
 def test_c_structures_take_no_number_that_they_would_change() -> None:
     """What ctypes cuts off without a word."""
-    job = {name: None if kind is ctypes.c_void_p else 0 for name, kind in kernel_module._Job._fields_}
-    kernel_module._Job(**job)
+    job = {name: None if kind is ctypes.c_void_p else 0 for name, kind in Job._fields_}
+    Job(**job)
     for name, value in (("steps", 2**64), ("last", 2**63), ("output_every", -(2**64) + 5), ("capacity", 2**80)):
         with pytest.raises(ValueError, match=f"{name} is .*, which C would take for"):
-            kernel_module._Job(**{**job, name: value})
+            Job(**{**job, name: value})
     with pytest.raises(TypeError, match="has no stepps"):
-        kernel_module._Job(**job, stepps=3)
+        Job(**job, stepps=3)
 
 
 def test_results_beyond_the_memory_are_refused_before_it_is_asked_for(
@@ -604,10 +605,18 @@ def test_a_metric_that_only_one_side_knows_is_an_error(shaken: Program, monkeypa
 
 def test_a_job_of_another_size_is_an_error(shaken: Program, monkeypatch: pytest.MonkeyPatch) -> None:
     sources = dict(kernel_source.runtime_sources())
-    sources["simulate.h"] = sources["simulate.h"].replace(
-        "  int64_t capacity; ", "  int64_t seed;\n  int64_t capacity; "
-    )
-    size = ctypes.sizeof(kernel_module._Job)
+    sources["simulate.h"] = sources["simulate.h"].replace("  int64_t capacity;", "  int64_t seed;\n  int64_t capacity;")
+    size = ctypes.sizeof(Job)
     monkeypatch.setattr(kernel_source, "runtime_sources", lambda: sources)
     with pytest.raises(LayoutError, match=f"bytes of a job: {size + 8}, expected {size}"):
         compiled(shaken)
+
+
+def test_every_member_of_a_job_is_where_python_writes_it() -> None:
+    names = [member.name for member in JOB]
+    offsets = ", ".join(f"offsetof(sl_job, {name})" for name in names)
+    source = f'#include <stddef.h>\n#include "simulate.h"\nconst int64_t offsets[] = {{{offsets}}};\n'
+    files = {**kernel_source.runtime_sources(), "offsets.c": source}
+    library = toolchain.load(toolchain.build_library(files, main="offsets.c"))
+    found = (ctypes.c_int64 * len(names)).in_dll(library, "offsets")
+    assert list(found) == [getattr(Job, name).offset for name in names]
