@@ -158,7 +158,7 @@ int springline_step(springline_controller *controller, const springline_referenc
 
 /* When a plant step needs the base's motion, in parts of the step: 0 is its start, 1 its end. */
 #define SPRINGLINE_BASE_NODES 3
-extern const springline_real springline_base_nodes[SPRINGLINE_BASE_NODES];
+extern const springline_real springline_base_nodes[3];
 
 /*
  * The plant, for tests and hardware in the loop: state after `step` seconds (classical Runge-Kutta, order 4, one step; take 1e-4) under a

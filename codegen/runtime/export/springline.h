@@ -92,7 +92,7 @@ int springline_step(springline_controller *controller, const springline_referenc
 
 /* When a plant step needs the base's motion, in parts of the step: 0 is its start, 1 its end. */
 #define SPRINGLINE_BASE_NODES {{base_nodes}}
-extern const springline_real springline_base_nodes[SPRINGLINE_BASE_NODES];
+extern const springline_real springline_base_nodes[{{base_nodes}}];
 
 /*
  * The plant, for tests and hardware in the loop: state after `step` seconds ({{integrator}}, one step; take 1e-4) under a
