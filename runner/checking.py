@@ -92,7 +92,7 @@ def resolve(
             table, remarks = _load_table(document[name], name, time, channels, where)
             tables.append(table)
             if duration is not None:
-                notes += [*remarks, _expect_overlap(table, document[name], name, duration, where)]
+                notes += [*remarks, _expect_overlap(table, document[name], name, channels, duration, where)]
         except InputError as error:
             problems += error.problems
     if problems:
@@ -258,7 +258,9 @@ def _load_table(
     return read_table(data, path, time, channels, ends, t0=table["t0"], where=where, key=key)
 
 
-def _expect_overlap(read: Table, table: Mapping[str, Any], name: str, duration: float, where: str) -> str:
+def _expect_overlap(
+    read: Table, table: Mapping[str, Any], name: str, channels: Sequence[Column], duration: float, where: str
+) -> str:
     """A note on the span of the record that a run of `duration` s uses. Raises InputError if there is none."""
     t0, path = table["t0"], table["path"]
     lasts = f"{path} lasts from {read.t0 + t0:.15g} to {read.end + t0:.15g} s"
@@ -281,6 +283,14 @@ def _expect_overlap(read: Table, table: Mapping[str, Any], name: str, duration: 
             note += f"; before the record the motion starts from rest at its first value, {before:.4g} s earlier"
         if late:
             note += f"; after the record the motion comes to rest at its last value, {after:.4g} s later"
+        names = (column.key.rpartition(".")[2] for column in channels)
+        astray = [
+            f"{name} {value / column.factor:.4g} {table['units'][name]}"
+            for name, column, value in zip(names, channels, read.astray(duration), strict=True)
+            if not math.isnan(value)
+        ]
+        if astray:
+            note += f", for which its accelerations are so small that it goes as far as {', '.join(astray)}"
     if duration < read.dt:
         note += f": less than one of its sample intervals of {read.dt:.15g} s (is units.t right?)"
     return note

@@ -497,7 +497,8 @@ def _splines_hash(scenario: Scenario) -> str:
     digest = sha256()
     for table in scenario.signal_tables:
         digest.update(repr((table.t0, table.dt, table.ends, table.coefficients.shape)).encode())
-        digest.update(np.ascontiguousarray(table.coefficients, "<f8").tobytes())
+        for numbers in (table.coefficients, table.bounds):
+            digest.update(np.ascontiguousarray(numbers, "<f8").tobytes())
     return digest.hexdigest()
 
 

@@ -5,6 +5,7 @@ reproduces a cubic, whatever lies outside the samples; that is what `ends` says:
 
     hold      the first and the last value stand still. A record that does not begin or end at rest is brought to rest
               there, before its first and after its last sample, with accelerations no larger than its own: see `_rest`
+              and, for ramps, which have none, `_bounds`
     periodic  the samples repeat, and so the spline is the periodic one. If the last row repeats the first, it closes
               the period; if it does not, the first row follows one sample after the last, unless that would be a jump
     error     nothing: the scenario's run must lie inside
@@ -16,7 +17,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -54,11 +55,15 @@ _ROUNDED = 1e-3
 _REPEATS = 1e-6
 # The step from the last row back to the first may be this much longer than the longest step between rows.
 _CLOSING_STEP = 1.5
-# A record whose rate varies by less than this share of the largest is a ramp: it has no accelerations to go by.
+# Samples rounded to multiples of r have, in the spline through them, accelerations of up to 6 r / dt^2 between them and
+# three times that at its ends: what stays within this many r / dt^2 may be nothing but rounding.
+_ROUNDING = 20.0
+# Samples and coefficients that are no better than doubles: what they are rounded to, in spacings of the largest.
+_DOUBLE = 8.0
+# A record whose rate varies by more than this share of the largest is no ramp, however coarse its digits.
 _RAMP = 0.25
-# No way to rest is so much longer than the record: the rule for ramps leaves it 16 records, but underflow knows no
-# rule.
-_LONGEST = 32
+# No way to rest takes more intervals, 8 MiB a channel: accelerations that need more are hardly any.
+_LONGEST = 2**18
 # Squares and products of what is larger (and of its inverse) leave the doubles.
 _LARGEST = 1e150
 _LARGEST_INTERVAL = 1e50
@@ -91,6 +96,7 @@ class Table:
     dt            sample interval, s
     coefficients  (intervals, channels, 4): in interval k, c0 + c1 tau + c2 tau^2 + c3 tau^3 with tau = t - (t0 + k dt)
     ends          what lies outside the samples
+    bounds        (channels,): the largest accelerations that there may be outside the samples, SI units
 
     Two are equal if they are the same signal, wherever their samples came from.
     """
@@ -99,6 +105,7 @@ class Table:
     dt: float
     coefficients: Floats
     ends: Ends
+    bounds: Floats
 
     @property
     def end(self) -> float:
@@ -114,26 +121,46 @@ class Table:
         """Whether the samples, or their repeats, have something to say about the times from 0 to `duration`, s."""
         return self.ends == "periodic" or (self.t0 < duration and self.end > 0.0)
 
+    def astray(self, duration: float) -> Floats:
+        """The value farthest from its samples that each channel takes on its way to or from rest, (channels,).
+
+        Of the times from 0 to `duration`, s; NaN for a channel that leaves its range by less than half of it.
+        """
+        before, after = (intervals[:, :, 0] for intervals in self.rests())
+        early, late = math.ceil(self.t0 / self.dt), math.floor((duration - self.end) / self.dt)
+        values = np.concatenate([before[len(before) - max(early, 0) :][: len(before)], after[: max(late + 1, 0)]])
+        own = self.coefficients[:, :, 0]
+        middle, range_ = (own.max(axis=0) + own.min(axis=0)) / 2, np.ptp(own, axis=0)
+        if not len(values):
+            return np.full(len(middle), math.nan)
+        far = np.abs(values - middle).argmax(axis=0)
+        found = values[far, np.arange(len(middle))]
+        return np.where(np.abs(found - middle) > range_, found, math.nan)
+
     def rests(self) -> tuple[Floats, Floats]:
         """Intervals that bring the motion to rest before the first and after the last sample, as coefficients.
 
         In the outermost interval all stands still; the record's last sample, or first, is where they begin.
         """
-        return _rest(self.coefficients, self.dt, last=False), _rest(self.coefficients, self.dt, last=True)
+        before, after = (_rest(self.coefficients, self.dt, self.bounds, last=last) for last in (False, True))
+        return before, after
 
     def __eq__(self, other: object) -> bool:
         return (
             isinstance(other, Table)
             and (self.t0, self.dt, self.ends) == (other.t0, other.dt, other.ends)
             and np.array_equal(self.coefficients, other.coefficients)
+            and np.array_equal(self.bounds, other.bounds)
         )
 
     def __hash__(self) -> int:
         return hash((self.t0, self.dt, self.ends, self.coefficients.shape))
 
 
-def spline(t0: float, dt: float, samples: Floats, ends: Ends) -> Table:
+def spline(t0: float, dt: float, samples: Floats, ends: Ends, digit: Floats | float = 0.0) -> Table:
     """The Table through `samples` (rows, channels), at least four rows; a periodic one repeats its first row last.
+
+    digit  what the last digit of each channel's samples is worth, (channels,) or one for all: see `_bounds`
 
     Coefficients beyond the doubles are infinite or NaN.
     """
@@ -151,7 +178,8 @@ def spline(t0: float, dt: float, samples: Floats, ends: Ends) -> Table:
         coefficients = np.ldexp(fit.c[::-1].transpose(1, 2, 0), powers)
     if ends == "periodic":
         t0 = 0.0 - -t0 % (dt * len(coefficients))  # what repeats needs no large times
-    return Table(t0, dt, np.ascontiguousarray(coefficients), ends)
+    digit = np.maximum(digit, _DOUBLE * np.spacing(np.abs(samples).max(axis=0)))
+    return Table(t0, dt, np.ascontiguousarray(coefficients), ends, _bounds(coefficients, dt, digit))
 
 
 def kernel_tables(tables: Sequence[Table]) -> list[KernelTable]:
@@ -170,28 +198,44 @@ def kernel_tables(tables: Sequence[Table]) -> list[KernelTable]:
     return result
 
 
-def _rest(coefficients: Floats, dt: float, *, last: bool) -> Floats:
+def _motion(coefficients: Floats, dt: float) -> tuple[Floats, Floats]:
+    """Rates and accelerations at the samples, (samples, channels) each."""
+    _, c1, c2, c3 = np.moveaxis(coefficients, 2, 0)
+    with np.errstate(over="ignore", invalid="ignore"):  # of coefficients that are refused later
+        rates = np.vstack([c1, c1[-1] + dt * (2 * c2[-1] + dt * 3 * c3[-1])])
+        return rates, np.vstack([2 * c2, 2 * c2[-1] + dt * 6 * c3[-1]])
+
+
+def _bounds(coefficients: Floats, dt: float, digit: Floats) -> Floats:
+    """The largest accelerations that each channel (channels,) may have on its way to rest: its own.
+
+    A ramp has none: what bends it, if anything, is the rounding of its samples to multiples of `digit`. It stops as at
+    a corner of its samples, with at most its rate over the sample interval.
+    """
+    rates, accelerations = _motion(coefficients, dt)
+    with np.errstate(over="ignore", invalid="ignore"):
+        fastest, own = np.abs(rates).max(axis=0), np.abs(accelerations).max(axis=0)
+        ramp = (own <= _ROUNDING * digit / dt**2) & (np.ptp(rates, axis=0) < _RAMP * fastest)
+        return np.where(ramp, np.maximum(own, fastest / dt), own)
+
+
+def _rest(coefficients: Floats, dt: float, bounds: Floats, *, last: bool) -> Floats:
     """Intervals that follow the last sample (or precede the first) and bring every channel to rest at its value there.
 
-    Each channel takes as many as keep its accelerations within the largest that it has between the samples. A ramp has
-    none to go by: its rate over the sample interval, which a corner in its samples would give, takes their place.
+    Each channel takes as many as keep its accelerations within its bound, (channels,).
     Returns (intervals, channels, 4); all channels stand still in the outermost interval.
     """
-    c0, c1, c2, c3 = np.moveaxis(coefficients, 2, 0)
-    rates = np.vstack([c1, c1[-1] + dt * (2 * c2[-1] + dt * 3 * c3[-1])])
-    accelerations = np.vstack([2 * c2, 2 * c2[-1] + dt * 6 * c3[-1]])
-    fastest = np.abs(rates).max(axis=0)
-    bounds = np.abs(accelerations).max(axis=0)
-    bounds = np.where(np.ptp(rates, axis=0) < _RAMP * fastest, np.maximum(bounds, fastest / dt), bounds)
-
+    rates, accelerations = _motion(coefficients, dt)
+    first, final = coefficients[0, :, 0], coefficients[-1]
     # Before the first sample the same motion runs backwards: its rates change their sign, its accelerations do not.
     at, sign = (-1, 1.0) if last else (0, -1.0)
     ways = [
-        _stopping(sign * dt * rate, dt**2 * acceleration, dt**2 * bound, _LONGEST * len(coefficients)) / dt**2
+        _stopping(sign * dt * rate, dt**2 * acceleration, dt**2 * bound) / dt**2
         for rate, acceleration, bound in zip(rates[at], accelerations[at], bounds, strict=True)
     ]
     result = np.zeros((max(map(len, ways)), len(ways), 4))
-    result[:, :, 0] = c0[-1] + dt * (c1[-1] + dt * (c2[-1] + dt * c3[-1])) if last else c0[0]
+    c0, c1, c2, c3 = final.T
+    result[:, :, 0] = c0 + dt * (c1 + dt * (c2 + dt * c3)) if last else first
     for channel, knots in enumerate(ways):
         moving = len(knots) - 1
         if last:
@@ -201,7 +245,7 @@ def _rest(coefficients: Floats, dt: float, *, last: bool) -> Floats:
     return result
 
 
-def _stopping(rate: float, acceleration: float, bound: float, most: int) -> Floats:
+def _stopping(rate: float, acceleration: float, bound: float) -> Floats:
     """Accelerations at the knots of a motion that ends at rest where it began, linear in between and within `bound`.
 
     Time is counted in intervals. Of all such motions in as many intervals, this is the one whose accelerations change
@@ -221,7 +265,7 @@ def _stopping(rate: float, acceleration: float, bound: float, most: int) -> Floa
         swing = (-rate - acceleration * gained[0]) / gained[1]  # the third, odd about the middle, gains no rate
         sway = (-rate * count - acceleration * moved[0] - swing * moved[1]) / moved[2]
         knots: Floats = acceleration * basis[0] + swing * basis[1] + sway * basis[2]
-        if np.abs(knots).max() <= bound or count > most:
+        if np.abs(knots).max() <= bound or count > _LONGEST:
             return knots
         count = max(count + 1, count * 9 // 8)
 
@@ -265,7 +309,8 @@ def read_table(
     _expect_moderate(values, file, channels, where)
     if ends == "periodic":
         values = _closed(values, file, channels, where)
-    table = spline(float(t[0]) - t0, dt, values, ends)
+    digit = [_digit(row[i] for row in cells) * column.factor for i, column in enumerate(columns)]
+    table = spline(float(t[0]) - t0, dt, values, ends, np.array(digit[1:]))
     _expect_moderate(np.abs(table.coefficients).max(axis=2), file, channels, where)
     return table, notes
 
@@ -308,6 +353,16 @@ def _numbers(lines: list[int], cells: list[list[str]], file: str, columns: Seque
     if problems:
         raise InputError(*problems)
     return np.array(cells, dtype=np.float64).reshape(len(cells), len(columns))
+
+
+def _digit(cells: Iterable[str]) -> float:
+    """What the last digit of a column's numbers is worth, at most 1."""
+    least = 0.0
+    for match in map(_NUMBER.fullmatch, cells):
+        assert match  # they were found to be numbers
+        mantissa, exponent = match.groups()
+        least = min(least, float((exponent or "e0")[1:]) - len(mantissa.partition(".")[2]))
+    return 10.0**least
 
 
 def _is_finite(cell: str) -> bool:

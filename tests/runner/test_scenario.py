@@ -20,6 +20,7 @@ from springline.model.sliding import LAWS
 from springline.model.system import SignalShape, Structure
 from springline.runner.errors import InputError
 from springline.runner.scenario import Scenario, load_scenario, packaged_scenarios, parse_set
+from springline.runner.tables import kernel_tables
 from springline.runner.toml_text import value_text
 
 GROUPS = {
@@ -457,6 +458,23 @@ def test_a_note_tells_the_span_that_the_run_uses(
     assert note.startswith("base_motion: ") and all(part in note for part in told), note
     assert ("rest" in note) == ("rest" in told[-1])
     assert scenario.with_overrides({"base_motion.kind": "none"}).notes == ()
+
+
+@pytest.mark.parametrize(("bend", "far"), [(0.05, True), (1.0, False)])
+@pytest.mark.parametrize("late", [False, True])
+def test_a_note_tells_of_a_motion_that_goes_astray_before_it_rests(
+    bend: float, far: bool, late: bool, recorded
+) -> None:
+    t = np.linspace(0.0, 10.0, 41)
+    scenario = recorded(t, t + bend * np.sin(t), "t0 = 5.0" if late else "t0 = -20.0", 40.0)
+    (note,) = scenario.notes
+    assert ("goes as far as" in note) == far, note
+    if far:
+        (table,) = kernel_tables(scenario.tables())
+        knots = table.t0 + table.dt * np.arange(len(table.coefficients))
+        seen = table.coefficients[(knots >= 0.0) & (knots <= 40.0), 0, 0]
+        told = float(note.rpartition("goes as far as shake ")[2].split()[0])
+        assert told == pytest.approx(seen[np.abs(seen - 5.0).argmax()], rel=1e-3)
 
 
 def test_t0_moves_the_record_and_nothing_else(recorded) -> None:

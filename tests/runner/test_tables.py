@@ -162,15 +162,58 @@ def test_a_record_at_rest_needs_no_way_to_it() -> None:
     assert before.tolist() == after.tolist() == [[[0.3, 0.0, 0.0, 0.0], [-7.0, 0.0, 0.0, 0.0]]]
 
 
-@pytest.mark.parametrize("bend", [0.0, 1e-9, 0.02])
-def test_a_ramp_stops_as_at_a_corner_of_its_samples(bend: float) -> None:
-    """It has no acceleration, or too little to go by: its rate over the sample interval is enough to stop it."""
+def digits(values: np.ndarray, places: int | None) -> np.ndarray:
+    return values if places is None else np.round(values, places)
+
+
+@pytest.mark.parametrize(("places", "bend"), [(None, 0.0), (3, 0.0), (2, 1e-3)])
+def test_a_ramp_stops_as_at_a_corner_of_its_samples(places: int | None, bend: float) -> None:
+    """It has no acceleration but what its digits make: its rate over the sample interval is enough to stop it."""
     t = 0.2 * np.arange(30)
-    table = spline(0.0, 0.2, (1.5 * t + bend * np.sin(t))[:, None], "hold")
+    table = csv(rows(t, digits(1.5 * t + bend * np.sin(t), places)), "hold")
     for intervals in table.rests():
         assert 3 <= len(intervals) - 1 <= 8
         assert np.abs(2 * intervals[..., 2]).max() <= 1.55 / 0.2
         assert np.ptp(intervals[..., 0]) <= 1.55 * 0.2  # and it goes no further than one sample would have taken it
+
+
+@pytest.mark.parametrize("dt", [1e-3, 0.2, 30.0])
+@pytest.mark.parametrize("bend", [0.5, 0.02, 1e-3])
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_what_is_nearly_a_ramp_is_stopped_by_its_own_accelerations(dt: float, bend: float, unit: float) -> None:
+    """However long that takes, and in whatever unit its digits are written."""
+    turns = 0.2 * np.arange(30)
+    record = rows(dt * np.arange(30), (1.5 * turns + bend * np.sin(turns)) / unit)
+    channels = [Column("a", "reference.columns.a", unit)]
+    table, _ = read_table(record.encode(), "x.csv", Column("t", ""), channels, "hold", where="s.toml", key="")
+    own = own_accelerations(table)
+    assert own == pytest.approx(bend * (0.2 / dt) ** 2, rel=0.1)
+    for intervals in table.rests():
+        c2, c3 = intervals[..., 2], intervals[..., 3]
+        assert np.all(np.maximum(np.abs(2 * c2), np.abs(2 * c2 + 6 * c3 * dt)).max(axis=0) <= own * (1 + 1e-12))
+
+
+def test_accelerations_too_small_to_count_take_no_longer_than_a_table_may() -> None:
+    t = 0.2 * np.arange(30)
+    before, after = spline(0.0, 0.2, (1.5 * t + 1e-9 * np.sin(t))[:, None], "hold").rests()
+    assert 2**18 <= len(before) <= 2**18 * 1.13 and 2**18 <= len(after) <= 2**18 * 1.13
+
+
+def test_a_digit_is_what_the_last_place_written_is_worth() -> None:
+    t = 0.2 * np.arange(30)
+    bent = [f"{value:.4f}" for value in 1.5 * t + 1e-3 * np.sin(t)]
+
+    def bound(cells: list[str]) -> float:
+        text = "t,a\n" + "".join(f"{time!r},{cell}\n" for time, cell in zip(t.tolist(), cells, strict=True))
+        return float(csv(text, "hold").bounds[0])
+
+    as_ramp = bound(bent)
+    assert as_ramp == pytest.approx(1.5 / 0.2, rel=0.01)
+    assert bound([f"{float(cell) * 100:.2f}e-2" for cell in bent]) == as_ramp
+    # One digit more, wherever it stands, says that the others are as good; what overflows and underflows is no digit.
+    assert bound([f"{bent[0]}00", *bent[1:]]) < 0.1
+    assert bound(["0e-99999", *bent[1:]]) < 0.1
+    assert bound([f"0e{'9' * 5000}", *bent[1:]]) == as_ramp
 
 
 # Between them
