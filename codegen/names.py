@@ -47,6 +47,7 @@ _HEADERS = _words("""
     strings stropts syslog tar termios ucontext ulimit unistd utime utmpx values windows winsock2 wordexp
     arm_acle arm_neon arm_sve cpuid emmintrin immintrin intrin mm_malloc nmmintrin pmmintrin smmintrin tmmintrin unwind
     wmmintrin x86intrin xmmintrin
+    bzlib curses expat lzma ncurses zlib
 """)
 
 _DEVICES = frozenset({"con", "prn", "aux", "nul", *(f"{port}{k}" for port in ("com", "lpt") for k in range(10))})
@@ -54,7 +55,10 @@ _TARGETS = _words("""
     all all_build clean depend edit_cache help install list_install_components package package_source preinstall
     rebuild_cache run_tests test zero_check
 """)
-_LIBRARIES = _words("asan atomic c crypt dl gcc gcc_s gomp m nsl pthread resolv rt stdc stdcxx util")
+_LIBRARIES = _words("""
+    asan atomic bz2 c crypt crypto curl dl expat gcc gcc_s gomp lzma m ncurses nsl pthread readline resolv rt ssl stdc
+    stdcxx tinfo util z
+""")
 
 # <prefix>_init is a function of <stdatomic.h>, <threads.h>, <semaphore.h>, <pthread.h>; FE_OVERFLOW is a macro of
 # <fenv.h>; SIG_, LC_ and so on are kept for macros to come.

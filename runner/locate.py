@@ -24,9 +24,16 @@ _LARGEST_SCENARIO = 2**24
 _LARGEST_SIGNAL_FILE = 2**30
 
 
-Kind = Literal["scenario", "sweep", "dataset", "folder of a run", ""]
+Kind = Literal["scenario", "sweep", "dataset", "file of a dataset", "folder of a run", "folder of an export", "FMU", ""]
 """What a user may give to a command; "" for what is of no kind that can be told."""
 
+# Files that our commands leave in a folder, and what that makes it.
+_SIGNS: dict[str, Kind] = {
+    "sweep.json": "dataset",
+    "scenario.toml": "folder of a run",
+    "self_check.c": "folder of an export",
+}
+_RESULTS = (".json", ".parquet")
 _SWEEPS_OWN = ("scenario", "vary", "method", "samples", "keep")
 
 
@@ -81,9 +88,12 @@ def expect_kind(wanted: Kind, source: str | Path, document: Mapping[str, object]
         "scenario": f"springline run {quoted}",
         "sweep": f"springline batch {quoted}",
         "dataset": f"springline replay {quoted} RUN, or springline batch SWEEP -o {quoted} --resume",
+        "file of a dataset": f"springline replay {shlex.quote(str(Path(name).parent))} RUN",
         "folder of a run": f"its scenario is {Path(name, 'scenario.toml')}",
+        "folder of an export": "it was made from a scenario, which is what commands take",
+        "FMU": "other simulators load it; it was made from a scenario, which is what commands take",
     }
-    raise InputError(Problem(name, "", f"this is a {found}: {commands[found]}"))
+    raise InputError(Problem(name, "", f"this is {'an' if found == 'FMU' else 'a'} {found}: {commands[found]}"))
 
 
 def _packaged_kind(name: str) -> Kind:
@@ -95,11 +105,11 @@ def _packaged_kind(name: str) -> Kind:
 def _kind_at(path: Path) -> Kind:
     """What a folder is by the files that our commands leave in it, and a file by its text."""
     try:
-        if not path.is_dir():
-            return kind_of(read_toml(file_text(path)))
-        if (path / "sweep.json").exists():
-            return "dataset"
-        return "folder of a run" if (path / "scenario.toml").exists() else ""
+        if path.is_dir():
+            return next((kind for file, kind in _SIGNS.items() if (path / file).exists()), "")
+        if path.suffix in _RESULTS and (path.parent / "sweep.json").exists():
+            return "file of a dataset"
+        return "FMU" if path.suffix == ".fmu" else kind_of(read_toml(file_text(path)))
     except (OSError, ValueError):
         return ""
 
@@ -114,6 +124,8 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         file = _packaged_file(f"{name}.toml")
         return file.read_text("utf-8"), Path(str(file)).parent
     path = Path(source)
+    if path.exists() and path.suffix != ".toml":
+        expect_kind("scenario", source)
     try:
         return file_text(path), Path(os.path.realpath(path)).parent
     except (FileNotFoundError, NotADirectoryError) as error:

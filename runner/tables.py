@@ -178,8 +178,8 @@ def spline(t0: float, dt: float, samples: Floats, ends: Ends, digit: Floats | fl
         coefficients = np.ldexp(fit.c[::-1].transpose(1, 2, 0), powers)
     if ends == "periodic":
         t0 = 0.0 - -t0 % (dt * len(coefficients))  # what repeats needs no large times
-    digit = np.maximum(digit, _DOUBLE * np.spacing(np.abs(samples).max(axis=0)))
-    return Table(t0, dt, np.ascontiguousarray(coefficients), ends, _bounds(coefficients, dt, digit))
+    coarse: Floats = np.maximum(digit, _DOUBLE * np.spacing(np.abs(samples).max(axis=0)))
+    return Table(t0, dt, np.ascontiguousarray(coefficients), ends, _bounds(coefficients, dt, coarse))
 
 
 def kernel_tables(tables: Sequence[Table]) -> list[KernelTable]:
@@ -216,7 +216,8 @@ def _bounds(coefficients: Floats, dt: float, digit: Floats) -> Floats:
     with np.errstate(over="ignore", invalid="ignore"):
         fastest, own = np.abs(rates).max(axis=0), np.abs(accelerations).max(axis=0)
         ramp = (own <= _ROUNDING * digit / dt**2) & (np.ptp(rates, axis=0) < _RAMP * fastest)
-        return np.where(ramp, np.maximum(own, fastest / dt), own)
+        result: Floats = np.where(ramp, np.maximum(own, fastest / dt), own)
+    return result
 
 
 def _rest(coefficients: Floats, dt: float, bounds: Floats, *, last: bool) -> Floats:
@@ -362,7 +363,7 @@ def _digit(cells: Iterable[str]) -> float:
         assert match  # they were found to be numbers
         mantissa, exponent = match.groups()
         least = min(least, float((exponent or "e0")[1:]) - len(mantissa.partition(".")[2]))
-    return 10.0**least
+    return float(10.0**least)
 
 
 def _is_finite(cell: str) -> bool:

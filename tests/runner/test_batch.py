@@ -459,6 +459,11 @@ def test_replay_of_a_part_that_is_not_whole_says_so(sweep: Path, tmp_path: Path,
         (["batch", "mine.toml"], "mine.toml: this is a scenario: springline run mine.toml"),
         (["batch", "data"], "data: this is a dataset: springline replay data RUN, or springline batch"),
         (["replay", "sweep.toml", "0"], "sweep.toml: this is a sweep: springline batch sweep.toml"),
+        (["run", "data/sweep.json"], "data/sweep.json: this is a file of a dataset: springline replay data RUN"),
+        (["batch", "data/part-000000.parquet"], "this is a file of a dataset: springline replay data RUN"),
+        (["run", "arm.fmu"], "arm.fmu: this is an FMU: other simulators load it"),
+        (["replay", "arm.fmu", "0"], "arm.fmu: this is an FMU: other simulators load it"),
+        (["run", "c"], "c: this is a folder of an export: it was made from a scenario"),
         (["replay", "gains", "0"], "gains: this is a sweep: springline batch gains"),
         (["replay", "mine.toml", "0"], "this is a scenario: springline run mine.toml"),
         (
@@ -476,6 +481,10 @@ def test_what_belongs_to_another_command_is_told(
     Path("one run", "scenario.toml").write_text("[control]\nk1 = 3.0\n", encoding="utf-8")
     Path("data").mkdir()
     Path("data", "sweep.json").write_text("{}", encoding="utf-8")
+    Path("data", "part-000000.parquet").write_bytes(b"PAR1\xff")
+    Path("arm.fmu").write_bytes(b"PK\x03\x04\xff")
+    Path("c").mkdir()
+    Path("c", "self_check.c").touch()
     done = command(*words)
     assert done.exit_code == 2
     assert said in done.stderr
