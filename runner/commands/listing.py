@@ -10,7 +10,7 @@ import typer
 from springline.runner.terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from springline.model.parameters import Joint, Parameter
 
@@ -24,14 +24,21 @@ class What(StrEnum):
     laws = "laws"
     parameters = "parameters"
     scenarios = "scenarios"
+    sweeps = "sweeps"
 
 
 def list_(
     what: Annotated[What, typer.Argument(help="Which list.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
-    """List mechanisms, laws, parameters or packaged scenarios."""
-    rows = {"mechanisms": mechanisms, "laws": laws, "parameters": parameters, "scenarios": scenarios}[what.value]()
+    """List mechanisms, laws, parameters, packaged scenarios or sweeps."""
+    rows = {
+        "mechanisms": mechanisms,
+        "laws": laws,
+        "parameters": parameters,
+        "scenarios": scenarios,
+        "sweeps": sweeps,
+    }[what.value]()
     if as_json:
         print_json("list", rows, {})
         return
@@ -89,15 +96,23 @@ def parameters() -> list[Row]:
 
 def scenarios() -> list[Row]:
     """Every packaged scenario with the comment that it begins with."""
-    from importlib import resources
+    from springline.runner.locate import packaged_scenarios
 
-    from springline.runner.scenario import packaged_scenarios
+    return _titled("", packaged_scenarios())
 
-    folder = resources.files("springline.runner") / "scenarios"
-    return [
-        {"name": name, "title": _title(folder.joinpath(*f"{name}.toml".split("/")).read_text("utf-8"))}
-        for name in packaged_scenarios()
-    ]
+
+def sweeps() -> list[Row]:
+    """Every packaged sweep with the comment that it begins with."""
+    from springline.runner.locate import packaged_sweeps
+
+    return _titled("sweeps/", packaged_sweeps())
+
+
+def _titled(folder: str, names: Iterable[str]) -> list[Row]:
+    from springline.runner.locate import scenarios_folder
+
+    files = {name: scenarios_folder().joinpath(*f"{folder}{name}.toml".split("/")) for name in names}
+    return [{"name": name, "title": _title(file.read_text("utf-8"))} for name, file in files.items()]
 
 
 def _title(text: str) -> str:

@@ -31,7 +31,8 @@ from springline.runner.cli import app
 from springline.runner.commands import bench
 from springline.runner.commands import run as run_command
 from springline.runner.errors import InputError
-from springline.runner.scenario import load_scenario, packaged_scenarios, parse_set
+from springline.runner.locate import packaged_scenarios, packaged_sweeps
+from springline.runner.scenario import load_scenario, parse_set
 from springline.runner.simulate import simulate
 from springline.runner.storage import read_table, units
 
@@ -436,7 +437,10 @@ def shown_in(width: int, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> st
     return result.stdout
 
 
-TABLES = (["list", "parameters"], ["list", "scenarios"], ["list", "laws"], ["list", "mechanisms"], ["doctor"])
+TABLES = (
+    *(["list", what] for what in ("parameters", "scenarios", "sweeps", "laws", "mechanisms")),
+    ["doctor"],
+)
 
 
 @pytest.mark.parametrize("width", [40, 80, 100])
@@ -825,9 +829,10 @@ def test_list_laws_and_mechanisms() -> None:
     assert [row["name"] for row in rows_of("mechanisms")] == ["transfer_manipulator"]
 
 
-def test_list_scenarios_has_a_title_for_each() -> None:
-    rows = {row["name"]: row["title"] for row in rows_of("scenarios")}
-    assert list(rows) == list(packaged_scenarios())
+@pytest.mark.parametrize(("what", "names"), [("scenarios", packaged_scenarios()), ("sweeps", packaged_sweeps())])
+def test_list_has_a_title_for_each_packaged_file(what: str, names: tuple[str, ...]) -> None:
+    rows = {row["name"]: row["title"] for row in rows_of(what)}
+    assert list(rows) == list(names)
     assert all(rows.values())
 
 
