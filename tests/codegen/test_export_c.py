@@ -221,7 +221,8 @@ def test_exports_fit_into_one_translation_unit(
     parts[2:4] = reversed(parts[2:4])  # in any order
     unit.write_text("".join(f'#include "{part}"\n' for part in parts) + "#include <math.h>\n")
     includes = [f"-I{folder / inner}" for folder, _ in folders for inner in ("include", "src")]
-    flags = [*language, "-O1", "-ffp-contract=off", *STRICT, *includes]
+    level = "-O1" if compiler.endswith("++") else "-O0"  # C is optimised in the tests above
+    flags = [*language, level, "-ffp-contract=off", *STRICT, *includes]
     run(require_tool(compiler), *flags, "-c", unit, "-o", tmp_path / "unit.o")
     gcc = require_tool("gcc")
     for name, (folder, _) in zip(names, folders, strict=True):
