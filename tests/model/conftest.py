@@ -141,7 +141,6 @@ class Inertial:
 
 @pytest.fixture(scope="session")
 def inertial() -> Inertial:
-    """It takes seconds to derive: tests that ask for it go to one worker, as the xdist_group "sympy"."""
     return Inertial()
 
 

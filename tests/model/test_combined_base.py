@@ -49,7 +49,6 @@ def force_scale(q, dq, ddq, b, db, ddb, values):
     return np.stack([force, force * L3 + J * angular])
 
 
-@pytest.mark.xdist_group("sympy")
 def test_against_sympy(model, inertial, case):
     """Inertial coordinates and Euler-Lagrange by SymPy: with and without the base's motion."""
     q, dq, ddq, b, db, ddb, values, p = case
@@ -61,7 +60,6 @@ def test_against_sympy(model, inertial, case):
         assert np.max(error) < 1e-14
 
 
-@pytest.mark.xdist_group("sympy")
 def test_disturbance_against_sympy(model, inertial, case):
     """S = -(left side, base moving - left side, base at rest), whatever the joints' acceleration is."""
     q, dq, ddq, b, db, ddb, values, p = case

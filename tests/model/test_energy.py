@@ -31,7 +31,6 @@ def test_stiff_vibration_loses_energy_as_rk4_must(model, rk4):
     assert abs(errors[-1]) < 1e-9 * model("energy", START)[0]
 
 
-@pytest.mark.xdist_group("sympy")
 def test_energy_function_is_the_inertial_energy(model, inertial, rng):
     """Arm energy from the inertial derivation plus motors and springs, at random states."""
     x = rng.uniform(-3, 3, (8, 200))
@@ -59,7 +58,6 @@ def motors_and_springs(model, x):
     return (inertia @ dq2**2 + stiffness @ (q2 - q1) ** 2) / 2
 
 
-@pytest.mark.xdist_group("sympy")
 @pytest.mark.parametrize("moving", [(0,), (1,), (2,), (0, 1, 2)], ids=["shake", "pitch", "roll", "all"])
 def test_power_balance_at_random_states(model, inertial, rng, moving):
     """dE/dt = motor power + power through the base, the latter from Newton and Euler's laws (conftest.Inertial)."""
@@ -81,7 +79,6 @@ def test_power_balance_at_random_states(model, inertial, rng, moving):
     assert np.max(np.abs(change - supplied) / (scale + np.abs(inertial.power(*motion)))) < 1e-12
 
 
-@pytest.mark.xdist_group("sympy")
 def test_work_along_a_run(model, inertial, rk4):
     """The same balance integrated: a driven arm on a ship that shakes, pitches and rolls."""
     amplitude, omega = np.array([0.3, 0.15, 0.25]), np.array([1.5, 2.1, 1.1])

@@ -226,9 +226,6 @@ def test_every_figure_of_the_paper_is_there_once() -> None:
 
 # The folder
 
-# One worker runs what looks at it, so the group is reproduced once.
-reproduced = pytest.mark.xdist_group("reproduction")
-
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Reproduction:
@@ -252,7 +249,6 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-@reproduced
 def test_a_group_alone_gives_its_rows_figures_and_claims(done: Reproduction) -> None:
     figures = {f"figures/figure_{number}.{form}" for number in range(22, 26) for form in ("png", "svg")}
     assert set(contents(done.folder)) == figures | {"report.md", "report.html", "numbers.json", "manifest.json"}
@@ -266,7 +262,6 @@ def test_a_group_alone_gives_its_rows_figures_and_claims(done: Reproduction) -> 
     assert all(row["value"] is None for row in off if row["measure"] == "settling_time")
 
 
-@reproduced
 def test_every_number_has_its_change_at_half_the_step(done: Reproduction) -> None:
     assert all(number.halved is not None for finding in done.findings for number in finding.numbers)
     assert all(row["change"] is not None for row in done.table if row["value"] is not None)
@@ -274,7 +269,6 @@ def test_every_number_has_its_change_at_half_the_step(done: Reproduction) -> Non
     assert all(abs(row["change"]) <= 1e-4 for row in settling)
 
 
-@reproduced
 def test_another_process_replaces_it_with_the_same_bytes(done: Reproduction, tmp_path: Path) -> None:
     """Half of an earlier reproduction and a file of the user's are there already."""
     before = contents(done.folder)
@@ -292,7 +286,6 @@ def test_another_process_replaces_it_with_the_same_bytes(done: Reproduction, tmp
     assert contents(tmp_path) == before | {"notes.txt": b"mine"}
 
 
-@reproduced
 @pytest.mark.usefixtures("drawn")
 def test_an_edited_report_is_replaced_only_when_asked(done: Reproduction, tmp_path: Path) -> None:
     folder = tmp_path / "out"
@@ -305,7 +298,6 @@ def test_an_edited_report_is_replaced_only_when_asked(done: Reproduction, tmp_pa
     assert contents(folder) == contents(done.folder)
 
 
-@reproduced
 @pytest.mark.parametrize(
     ("there", "told"),
     [
@@ -340,7 +332,6 @@ def test_a_folder_with_other_things_in_it_is_left_alone(tmp_path: Path) -> None:
     assert list(contents(tmp_path)) == ["notes.txt"]
 
 
-@reproduced
 @pytest.mark.usefixtures("drawn")
 def test_overrides_change_every_run_and_the_report_says_so(tmp_path: Path) -> None:
     changes = {"control.delta": 0.06, "simulation.duration": 0.3}
@@ -395,7 +386,6 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
 
-@reproduced
 def test_the_html_report_needs_nothing_else(done: Reproduction) -> None:
     text = done.report.read_text(encoding="utf-8")
     page = Page(text)
@@ -411,7 +401,6 @@ def test_the_html_report_needs_nothing_else(done: Reproduction) -> None:
     assert "prefers-color-scheme: dark" in text
 
 
-@reproduced
 def test_the_markdown_report_shows_files_that_are_there(done: Reproduction) -> None:
     text = (done.folder / "report.md").read_text(encoding="utf-8")
     linked = re.findall(r"\]\(([^)]+)\)", text)
