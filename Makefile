@@ -25,10 +25,10 @@ reproduce: .venv/installed ## regenerate the C, then the paper's runs, tables, f
 	$(BIN)/springline reproduce -o $(OUT)
 
 test: .venv/installed ## the tests, WORKERS=2 at a time; lists what was skipped and why
-	$(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal -rs
 
 test-full: .venv/installed ## the tests with those that take minutes
-	$(BIN)/pytest -n $(WORKERS) --dist loadgroup -rs -m 'full or not full'
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal -rs -m 'full or not full'
 
 lint: .venv/installed ## ruff and mypy
 	$(BIN)/ruff check

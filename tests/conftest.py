@@ -1,10 +1,12 @@
-"""What all tests share: one kernel cache, one rule for missing tools, no deadlines, two other arms."""
+"""What all tests share: one kernel cache, one folder for what is made once, one rule for missing tools, other arms."""
 
+import fcntl
 import os
 import shutil
 import signal
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import ClassVar
 
 import casadi as ca
@@ -36,6 +38,32 @@ def pytest_configure(config: pytest.Config) -> None:
 def _no_width(monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands print whole lines, as into a pipe, whatever width a shell or a library has left in the environment."""
     monkeypatch.delenv("COLUMNS", raising=False)
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], object]], Path]:
+    """``once(name, make)``: a file or folder that the first of all workers to ask has made with ``make(path)``.
+
+    It is for reading: whoever changes it does so in a copy.
+    """
+    root = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        root = root.parent  # the workers' folders lie side by side
+    root = root / "once"
+
+    def made(name: str, make: Callable[[Path], object]) -> Path:
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.with_name(f"{path.name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not path.exists():
+                unfinished = path.with_name(f"{path.name}.unfinished")
+                shutil.rmtree(unfinished, ignore_errors=True)  # of a worker that failed
+                make(unfinished)
+                unfinished.rename(path)
+        return path
+
+    return made
 
 
 @pytest.fixture(scope="session")

@@ -8,17 +8,16 @@ import subprocess
 import sys
 import tarfile
 import zipfile
+from collections.abc import Callable
 from email.parser import Parser
 from pathlib import Path
 
 import pytest
 
-# One worker runs all of these, so the wheel is built once.
-pytestmark = pytest.mark.xdist_group("packaging")
-
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("benchmarks", "codegen", "generated", "model", "runner")
 CARRIED = (*PACKAGES, "docs", "examples", "tests")
+Once = Callable[[str, Callable[[Path], object]], Path]
 PYTHON = [sys.executable, "-I"]  # isolated: neither the current folder nor PYTHONPATH may help
 
 
@@ -39,21 +38,23 @@ def run(*command: str, cwd: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def dist(once: Once, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder with the sdist, and the wheel built from that sdist.
 
     Built from a copy: setuptools leaves build/ and *.egg-info behind, which the next wheel would pick up.
     """
-    source = tmp_path_factory.mktemp("source")
-    for folder in CARRIED:
-        if (ROOT / folder).exists():
-            shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
-    for file in ROOT.iterdir():
-        if file.is_file():
-            shutil.copy(file, source)
-    out = tmp_path_factory.mktemp("dist")
-    run(*PYTHON, "-m", "build", "--no-isolation", "--outdir", str(out), cwd=source)
-    return out
+
+    def make(out: Path) -> None:
+        source = tmp_path_factory.mktemp("source")
+        for folder in CARRIED:
+            if (ROOT / folder).exists():
+                shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
+        for file in ROOT.iterdir():
+            if file.is_file():
+                shutil.copy(file, source)
+        run(*PYTHON, "-m", "build", "--no-isolation", "--outdir", str(out), cwd=source)
+
+    return once("dist", make)
 
 
 @pytest.fixture(scope="module")
@@ -71,13 +72,15 @@ def sdist(dist: Path) -> set[str]:
 
 
 @pytest.fixture(scope="module")
-def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def installed(dist: Path, once: Once) -> Path:
     """A folder that the wheel is installed into; dependencies come from the running interpreter."""
     (path,) = dist.glob("*.whl")
-    target = tmp_path_factory.mktemp("installed")
-    pip = [*PYTHON, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--target", str(target)]
-    run(*pip, str(path), cwd=target)
-    return target
+
+    def make(target: Path) -> None:
+        pip = [*PYTHON, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--target", str(target)]
+        run(*pip, str(path), cwd=dist)
+
+    return once("installed", make)
 
 
 def test_wheel_holds_springline_and_nothing_else(wheel: set[str]) -> None:

@@ -1,5 +1,6 @@
 """The paper's nominal numbers under a shake, for tests of the generated code that do without scenario files."""
 
+import functools
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -55,17 +56,15 @@ def values_of() -> Callable[..., NDArray[np.float64]]:
 
 @pytest.fixture(scope="session")
 def build(
-    tmp_path_factory: pytest.TempPathFactory, shaken: Program, values_of: Values
+    once: Callable[[str, Callable[[Path], object]], Path], shaken: Program, values_of: Values
 ) -> Callable[[str, int, Settings], Path]:
     """build(part, version, settings): the FMU file of the shaken arm."""
-    folder = tmp_path_factory.mktemp("fmu")
 
     def built(part: str, version: int, settings: Settings = SAMPLED) -> Path:
         kind = "sampled" if settings.period else "continuous"
-        path = folder / f"{part}_{kind}_fmi{version}.fmu"
-        if not path.exists():
-            path.write_bytes(arm(shaken, values_of(shaken), part, version, settings, path.stem))
-        return path
+        name = f"{part}_{kind}_fmi{version}"
+        content = functools.partial(arm, shaken, values_of(shaken), part, version, settings, name)
+        return once(f"fmu/{name}.fmu", lambda path: path.write_bytes(content()))
 
     return built
 

@@ -14,6 +14,7 @@ from springline.model.system import SignalShape, Structure
 pytestmark = pytest.mark.usefixtures("other_arms")
 
 OMEGA, AMPLITUDE, DURATION = 7.0, 0.3, 1.0
+QUICK = ("-O0",)  # optimisation changes no bit: test_engines.py compares its levels
 VALUES = {
     "base_motion.shake.0.amplitude": AMPLITUDE,
     "base_motion.shake.0.omega": OMEGA,
@@ -32,7 +33,7 @@ def structure_of(integrator):
 
 
 def simulate(integrator, steps, **options):
-    options = KernelOptions(width=1, groups=1, packs=1, **options)
+    options = KernelOptions(width=1, groups=1, packs=1, flags=QUICK, **options)
     loop = kernel(KernelSpec(structure_of(integrator), True, options=options))
     values = np.array([[VALUES.get(slot.key, slot.default) for slot in loop.program.system.slots]])
     settings = LoopSettings(steps, DURATION / steps, hold=steps, output_every=steps)
@@ -71,8 +72,8 @@ def test_order(name):
 def test_engines_and_widths_agree_to_the_bit(name):
     reference, _ = simulate(name, 40, engine="casadi")
     np.testing.assert_array_equal(simulate(name, 40)[0], reference)
-    loop = kernel(KernelSpec(structure_of(name), options=KernelOptions(width=4, groups=2)))
-    scalar = kernel(KernelSpec(structure_of(name), options=KernelOptions(engine="casadi")))
+    loop = kernel(KernelSpec(structure_of(name), options=KernelOptions(width=4, groups=2, flags=QUICK)))
+    scalar = kernel(KernelSpec(structure_of(name), options=KernelOptions(engine="casadi", flags=QUICK)))
     values = np.array([[VALUES.get(slot.key, slot.default) for slot in loop.program.system.slots]] * 9)
     values[:, loop.parameters.index("initial.q.0")] = np.linspace(-0.3, 0.4, 9)
     settings = LoopSettings(200, 1e-3, output_every=50)
@@ -111,7 +112,7 @@ def test_eighth_order_at_one_millisecond_beats_rk4_at_a_tenth():
               "reference.rotation.terms.0.omega": math.pi / 2, "initial.q.0": 0.8, "initial.q.1": 0.5}  # fmt: skip
 
     def final(integrator, per_sample):
-        options = KernelOptions(width=1, groups=1, packs=1)
+        options = KernelOptions(width=1, groups=1, packs=1, flags=QUICK)
         loop = kernel(KernelSpec(Structure(integrator=integrator), True, options=options))
         p = np.array([[values.get(slot.key, slot.default) for slot in loop.program.system.slots]])
         return loop.run(p, LoopSettings(600 * per_sample, 1e-3 / per_sample, hold=per_sample)).final_state[0, :2]

@@ -35,7 +35,10 @@ from springline.model.linear import as_written
 from springline.model.system import SignalShape, Structure
 
 Values = Callable[..., NDArray[np.float64]]
-PLAIN = KernelOptions(width=1, groups=1, flags=("-O2",))
+# Low levels of optimisation, for they change no bit: test_engines.py compares them with all others.
+PLAIN = KernelOptions(width=1, groups=1, flags=("-O1",))
+WIDE = KernelOptions(width=4, groups=2, flags=("-O0",))
+CASADI = KernelOptions("casadi", flags=("-O0",))
 
 
 def with_plant(base: Program, right_hand_side: Callable[[ca.SX], ca.SX]) -> Program:
@@ -376,9 +379,7 @@ def test_control_that_overflows_ends_the_run_and_is_named(
 
 
 @pytest.mark.parametrize("sampled", [False, True])
-@pytest.mark.parametrize(
-    "options", [PLAIN, KernelOptions(width=4, groups=2), KernelOptions("casadi")], ids=["scalar", "lanes", "casadi"]
-)
+@pytest.mark.parametrize("options", [PLAIN, WIDE, CASADI], ids=["scalar", "lanes", "casadi"])
 def test_control_that_overflows_later_ends_the_run_there(
     options: KernelOptions, sampled: bool, values_of: Values
 ) -> None:
@@ -428,7 +429,7 @@ def parabola(rate: float, knots: int, dt: float, **options: object) -> Table:
     return Table(0.0, dt, bool(options.get("periodic", False)), pieces[:, None, :])
 
 
-@pytest.mark.parametrize("options", [PLAIN, KernelOptions(width=4, groups=2)], ids=["scalar", "lanes"])
+@pytest.mark.parametrize("options", [PLAIN, WIDE], ids=["scalar", "lanes"])
 def test_table_signals(options: KernelOptions, values_of: Values) -> None:
     """A table that holds a parabola shakes as the parabola does, wraps when periodic, holds its last interval's end."""
     tabled = program(Structure(base_motion=SignalShape("table", (1, 0, 0))))

@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 from fmi_client import Client, client_library
 
+from springline.codegen import fmu as fmu_module
 from springline.codegen.api import generate_files
 from springline.codegen.export import bind
 from springline.codegen.fmu import Settings, fmu
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.codegen.manifest import write_tree
+from springline.codegen.program import program
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS
 from springline.model.quantities import Q1, Quantity
@@ -27,6 +29,7 @@ from springline.model.system import SignalShape, Structure
 pytestmark = pytest.mark.usefixtures("other_arms")
 
 STEP, STEPS, HOLD = 1e-4, 400, 10
+QUICK = ("-O0",)  # optimisation changes no bit: test_engines.py, test_fmu.py and test_export_c.py compare its levels
 
 
 class WeakMotor(Effect):
@@ -48,6 +51,11 @@ class Offset(Effect):
 
 
 @pytest.fixture(autouse=True)
+def _fmus_that_are_compiled_quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fmu_module, "_FLAGS", (*fmu_module._FLAGS, *QUICK))
+
+
+@pytest.fixture(autouse=True)
 def _made_up_effects() -> Iterator[None]:
     effects = (WeakMotor(), Offset())
     EFFECTS.update({effect.name: effect for effect in effects})
@@ -65,7 +73,6 @@ def structure_of(mechanism: str, **changes: Any) -> Structure:
 
 def values_of(structure: Structure) -> np.ndarray:
     """The mechanism's own reference and start, under a base that moves; U_max low enough to limit now and then."""
-    loop = kernel(KernelSpec(structure, options=KernelOptions(engine="casadi")))
     arm = MECHANISMS[structure.mechanism]
     given = {"base_motion.shake.0.amplitude": 0.1, "base_motion.shake.0.omega": 9.0,
              "base_motion.pitch.0.amplitude": 0.05, "base_motion.pitch.0.omega": 3.0}  # fmt: skip
@@ -74,11 +81,11 @@ def values_of(structure: Structure) -> np.ndarray:
         for k, term in enumerate(arm.reference_terms[i]):
             stem = f"reference.{joint.name}.terms.{k}"
             given |= {f"{stem}.amplitude": term.amplitude, f"{stem}.omega": term.omega, f"{stem}.phase": term.phase}
-    return np.array([given.get(slot.key, slot.default) for slot in loop.program.system.slots])
+    return np.array([given.get(slot.key, slot.default) for slot in program(structure).system.slots])
 
 
 def rows_of(structure: Structure, sampled: bool, every: int = HOLD, **options: Any) -> np.ndarray:
-    loop = kernel(KernelSpec(structure, sampled, options=KernelOptions(**options)))
+    loop = kernel(KernelSpec(structure, sampled, options=KernelOptions(flags=QUICK, **options)))
     settings = LoopSettings(STEPS, STEP, hold=HOLD, output_every=every)
     runs = loop.run(values_of(structure)[None], settings)
     assert runs.status[0] == 0
@@ -112,7 +119,7 @@ def exported_rows(structure: Structure, folder: Path) -> np.ndarray:
     program = folder / "main"
     source = folder / "c"
     subprocess.run(
-        ["cc", "-O1", "-ffp-contract=off", "-std=c99", f"-I{source}/include", f"-I{source}/src",
+        ["cc", *QUICK, "-ffp-contract=off", "-std=c99", f"-I{source}/include", f"-I{source}/src",
          source / "src" / "springline.c", source / "main.c", "-o", program],
         check=True,
     )  # fmt: skip
@@ -174,7 +181,7 @@ def test_other_arms_are_exported_as_c_that_checks_itself(
     write_tree(folder, *generate_files(bind(structure, values_of(structure), tunable=["control"], prefix="other_arm")))
     includes = [f"-I{folder}/include", f"-I{folder}/src"]
     sources = [folder / "src" / "other_arm.c", folder / "src" / "other_arm_model.c", folder / "self_check.c"]
-    warnings = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-O1", "-ffp-contract=off"]
+    warnings = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", *QUICK, "-ffp-contract=off"]
     subprocess.run(["cc", *warnings, *includes, *sources, "-o", tmp_path / "check"], check=True)
     done = subprocess.run(
         [tmp_path / "check", folder / "test_vectors.txt"], capture_output=True, text=True, check=False

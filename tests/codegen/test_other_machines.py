@@ -29,17 +29,17 @@ Tool = Callable[..., str]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Any], Path]:
+def folder(once: Callable[[str, Callable[[Path], object]], Path]) -> Callable[[Any], Path]:
     """The folder of the nominal system's export in double or float."""
-    root = tmp_path_factory.mktemp("exports")
     scenario = load_scenario("paper/nominal")
 
-    def make(real: Any) -> Path:
-        if not (root / real).exists():
-            write_tree(root / real, *generate_files(bind(scenario.structure(), scenario.values(), real=real)))
-        return root / real
+    def exported(real: Any) -> Path:
+        def make(path: Path) -> None:
+            write_tree(path, *generate_files(bind(scenario.structure(), scenario.values(), real=real)))
 
-    return make
+        return once(f"exports/nominal_{real}", make)
+
+    return exported
 
 
 def compiled(compiler: str, export: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:

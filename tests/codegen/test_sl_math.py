@@ -81,7 +81,7 @@ def source() -> str:
     return "\n".join(text) + "\n"
 
 
-def compile_library(compiler: str, flags: list[str], folder: Path) -> ctypes.CDLL:
+def compile_library(compiler: str, flags: list[str], folder: Path) -> Path:
     """The functions of source(), in a library of its own that refers to no symbol of another."""
     (folder / "api.c").write_text(source())
     output = folder / f"{Path(compiler).name}{''.join(flags)}.so".replace("=", "_")
@@ -89,7 +89,7 @@ def compile_library(compiler: str, flags: list[str], folder: Path) -> ctypes.CDL
     command = [compiler, *fixed, *flags, f"-I{RUNTIME}", "-nostdlib", "-Wl,-z,defs", str(folder / "api.c")]
     done = subprocess.run([*command, "-o", str(output)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return ctypes.CDLL(str(output))
+    return output
 
 
 def call(library: ctypes.CDLL, name: str, x: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -130,8 +130,15 @@ def arguments() -> tuple[Floats, Floats]:
 
 
 @pytest.fixture(scope="module")
-def reference(require_tool: RequireTool, tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    return compile_library(require_tool("gcc"), ["-O2", "-DSL_W=4"], tmp_path_factory.mktemp("reference"))
+def reference(require_tool: RequireTool, once: Callable[[str, Callable[[Path], object]], Path]) -> ctypes.CDLL:
+    gcc = require_tool("gcc")
+
+    def make(folder: Path) -> None:
+        folder.mkdir()
+        compile_library(gcc, ["-O2", "-DSL_W=4"], folder)
+
+    (library,) = once("sl_math", make).glob("*.so")
+    return ctypes.CDLL(str(library))
 
 
 @pytest.fixture(scope="module")
@@ -345,7 +352,7 @@ def assert_equal_bits(
     compiler: str, flags: list[str], folder: Path, arguments: tuple[Floats, Floats], expected: dict[str, Bits]
 ) -> None:
     """Scalar and vector functions give the expected bits, and the fast ones wherever they say ok."""
-    library = compile_library(compiler, flags, folder)
+    library = ctypes.CDLL(str(compile_library(compiler, flags, folder)))
     for name, wanted in expected.items():
         for kind in ("s", "v"):
             differing = np.flatnonzero(bits(call(library, f"{kind}_{name}", *arguments)[0]) != wanted)

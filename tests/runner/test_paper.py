@@ -236,6 +236,15 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Reproduction:
     return result
 
 
+@pytest.fixture
+def drawn(done: Reproduction, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are those of `done`, for tests of anything else: to draw them would take most of the time."""
+    figures = done.folder / "figures"
+    monkeypatch.setattr(
+        paper, "figure_files", lambda name, _: {file.name: file.read_bytes() for file in figures.glob(f"{name}.*")}
+    )
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
@@ -277,6 +286,7 @@ def test_another_process_replaces_it_with_the_same_bytes(done: Reproduction, tmp
     assert contents(tmp_path) == before | {"notes.txt": b"mine"}
 
 
+@pytest.mark.usefixtures("drawn")
 def test_an_edited_report_is_replaced_only_when_asked(done: Reproduction, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     shutil.copytree(done.folder, folder)
@@ -322,6 +332,7 @@ def test_a_folder_with_other_things_in_it_is_left_alone(tmp_path: Path) -> None:
     assert list(contents(tmp_path)) == ["notes.txt"]
 
 
+@pytest.mark.usefixtures("drawn")
 def test_overrides_change_every_run_and_the_report_says_so(tmp_path: Path) -> None:
     changes = {"control.delta": 0.06, "simulation.duration": 0.3}
     made = reproduce(tmp_path / "out", [4], overrides=changes)
