@@ -65,7 +65,7 @@ def fmu(
     wanted = bind(structure, values, tunable=tunable).tunable
     keys = [system.slots[i].key for i in part_parameters(system, part) if i in set(wanted)]
     needed = () if part == "controller" else tables
-    export = bind(structure, values, tunable=keys, prefix=identifier, tables=needed)
+    export = bind(structure, values, tunable=keys, prefix=identifier, tables=needed, period=settings.sample)
     typed = TypedInterface(export)
     shown = interface(export, typed, part)
     code = sources(export, typed, shown, settings, version)

@@ -79,7 +79,6 @@ def _model(
     else:
         grid, grid_meaning = settings.step, "s, step of the integrator"
         until = settings.until
-    hold = round(settings.period / settings.step)
     lines = [
         "#include <stdint.h>",
         "",
@@ -96,7 +95,7 @@ def _model(
                 ("FMU_NO_LIMIT", NO_LIMIT, "stands for infinity, as do greater numbers"),
             )
         ),
-        f"#define FMU_HOLD {hold} /* steps per sample of the control, 0: continuous */",
+        f"#define FMU_HOLD {settings.hold} /* steps per sample of the control, 0: continuous */",
         f"#define FMU_BASE_IS_INPUT {int(base_is_input(system, part))}",
         "",
         "enum {",
