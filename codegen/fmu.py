@@ -67,7 +67,7 @@ def fmu(
     needed = () if part == "controller" else tables
     export = bind(structure, values, tunable=keys, prefix=identifier, tables=needed, period=settings.sample)
     typed = TypedInterface(export)
-    shown = interface(export, typed, part)
+    shown = interface(export, typed, part, sampled=part == "controller" or settings.period > 0.0)
     code = sources(export, typed, shown, settings, version)
     describe = partial(
         model_description, shown, settings, version, identifier=identifier, name=name, description=description(shown)
