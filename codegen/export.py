@@ -127,7 +127,7 @@ class Export:
     @cached_property
     def sha256(self) -> str:
         """Hash of model, parameters and options: it changes if and only if the exported files may."""
-        identity = {
+        identity: dict[str, object] = {
             "model": [_instructions(function) for function in self.system.functions.values()],
             "structure": asdict(self.system.structure),
             "parameters": {slot.key: value for slot, value in zip(self.slots, self.values, strict=True)},

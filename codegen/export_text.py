@@ -18,7 +18,6 @@ from springline.codegen.tables import print_tables
 from springline.codegen.typed import STATUS, TypedInterface
 from springline.codegen.vectors import TIME_STEP, control_outputs
 
-
 _ROW = 0.01  # s between the rows that main prints
 
 
@@ -116,8 +115,10 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
     measured = [field.name for field in structures["measurement"]]
     memory = [field.name for field in structures.get("memory", ())]
     places = [f"command.{name}" for name in outputs[:n]]
-    for name in outputs[n : len(outputs) - len(memory)]:
-        places.append(f"{'(springline_real)' if of_diagnostics[name].integer else ''}diagnostics.{name}")
+    places += [
+        f"{'(springline_real)' if of_diagnostics[name].integer else ''}diagnostics.{name}"
+        for name in outputs[n : len(outputs) - len(memory)]
+    ]
     tunable = export.tunable_slots
     call = [f"  {export.real} x[{len(states)}] = {{{literal(0.0, export.real)}}};"]
     bad_parameter = []
@@ -176,12 +177,12 @@ def _calling(export: Export) -> str:
     """How often a controller wants to be called."""
     if not export.system.memory:
         return (
-            "How fast to call `springline_step`: the law keeps no state between samples, but the springs do, and a command that"
-            " comes too\nseldom or too late destabilises them."
+            "How fast to call `springline_step`: the law keeps no state between samples, but the springs do, and a "
+            "command that comes too\nseldom or too late destabilises them."
         )
     return (
-        f"Call `springline_step` every {1e3 * export.period:g} ms: by so much it moves the controller's states on. A command "
-        "that comes too\nseldom or too late destabilises the springs."
+        f"Call `springline_step` every {1e3 * export.period:g} ms: by so much it moves the controller's states on. A "
+        "command that comes too\nseldom or too late destabilises the arm."
     )
 
 
@@ -194,8 +195,10 @@ def _memory_check(memory: list[str]) -> dict[str, str]:
     differ = [f"controller->z.{name} != z.{name}" for name in memory]
     return {
         "memory_enum": f"       MEMORY = {len(memory)},\n",
-        "memory_check": f"{taken}  if (differs(\"the states before springline_step\", line, control_outputs + CONTROL_OUT - "
-        "MEMORY, MEMORY,\n              in + CONTROL_IN - MEMORY, got)) {\n    return 1;\n  }\n",
+        "memory_check": taken + '  if (differs("the states before springline_step", line,\n'
+        "              control_outputs + CONTROL_OUT - MEMORY, MEMORY, in + CONTROL_IN - MEMORY, got)) {\n"
+        "    return 1;\n"
+        "  }\n",
         "memory_local": "  springline_memory z;\n",
         "memory_seen": "  z = controller->z;\n",
         "kept": " || ".join(differ) + " ||\n      ",

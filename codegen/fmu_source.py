@@ -106,7 +106,7 @@ def _model(
         f"  FMU_VALUES = {len(interface.variables)},",
         f"  FMU_STATES = {len(typed.structures['state'])},",
         f"  FMU_DIAGNOSTICS = {len(typed.structures['diagnostics'])},",
-        f"  FMU_CURRENT = {(1 + len(system.sliding)) * system.n}, /* e and sigma, the first diagnostics, are never held */",
+        f"  FMU_CURRENT = {(1 + len(system.sliding)) * system.n}, /* the first diagnostics, e and sigma: never held */",
         ",\n".join(f"  FMU_AT_{name.upper()} = {place}" for name, place in interface.blocks.items()),
         "};",
         "",

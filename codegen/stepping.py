@@ -123,7 +123,8 @@ def kernel_update(tableau: Tableau, states: str = "SL_NX") -> str:
     instants = [node for node in tableau.nodes if node < 1.0]
     places = [kept.index(stage) if stage in kept else -1 for stage in range(tableau.stages)]
     cases = "\n".join(
-        f"    case {stage}: {{\n{_kernel_case(tableau, stage, states)}\n      break;\n    }}" for stage in range(tableau.stages)
+        f"    case {stage}: {{\n{_kernel_case(tableau, stage, states)}\n      break;\n    }}"
+        for stage in range(tableau.stages)
     )
     return f"""/* The integrator: {tableau.title}, order {tableau.order}. */
 enum {{ SL_STAGES = {tableau.stages}, SL_INSTANTS = {len(instants)}, SL_KEPT = {len(kept)} }};

@@ -30,8 +30,22 @@ STATUS = (
 """Statuses in the order of their values: name, and what happened and what to do about it."""
 
 _LINE = 120  # characters
-_MEMORY = "controller->z."
 _MATH_STACK = 160  # bytes below the deepest elementary function, as measured on Cortex-M7
+
+_MEMORY = "controller->z."
+
+# Placeholders of what is there only for a controller that has states.
+_OF_MEMORY = (
+    "memory_struct",
+    "controller_memory",
+    "initial_memory",
+    "forget",
+    "ahead_parameter",
+    "ahead_checked",
+    "ahead_local",
+    "ahead_argument",
+    "keep_ahead",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +64,9 @@ class TypedInterface:
     def __init__(self, export: Export) -> None:
         self.export = export
         system = export.system
-        names = ("measure", "control", "plant", "start", "signals")
+        names = ["measure", "control", "plant", "start", "signals"]
         remembers = bool(system.memory)
-        names += ("rates",) if remembers else ()
+        names += ["rates"] if remembers else []
         self._printer = ScalarPrinter(export, [system.function(name) for name in names], hoist=True)
         if remembers:
             self._printer.join("control", system.function("update"), h=export.period)
@@ -88,7 +102,7 @@ class TypedInterface:
         first = (1 + len(system.sliding)) * system.n  # of the command's parts
         seen = [f"diagnostics->{f.name}" for f in (*numbers[first:], *numbers[:first])]
         seen += [f"ahead->{f.name}" for f in self.structures.get("memory", ())]
-        seeing = {port: "reference->" for port in ("q1d", "dq1d", "ddq1d")} | {"x": "measurement->", "z": _MEMORY}
+        seeing = dict.fromkeys(("q1d", "dq1d", "ddq1d"), "reference->") | {"x": "measurement->", "z": _MEMORY}
         measured = {field.name for field in self.structures["measurement"]}
         self.bodies: dict[str, Body] = {
             "measure": self._printer.body(
@@ -157,9 +171,7 @@ class TypedInterface:
     def stack(self, name: str) -> int:
         """Estimated bytes of stack of springline_step ("control") or springline_plant_step ("plant")."""
         real = 8 if self.export.real == "double" else 4
-        local = (
-            self._past + self.bytes_of("diagnostics") if name == "control" else 4 * self.bytes_of("state")
-        )
+        local = self._past + self.bytes_of("diagnostics") if name == "control" else 4 * self.bytes_of("state")
         return _padded(real * self.bodies[name].live + local + _MATH_STACK, 16)
 
     # -- blocks of the templates --------------------------------------------------------------------------------
@@ -206,6 +218,7 @@ class TypedInterface:
             "states": str(len(state)),
             **self._stepping(),
             **self._remembering(),
+            "diagnostics_meaning": self._diagnostics_meaning(),
             "control_operations": str(self.bodies["control"].operations),
             "plant_operations": str(self.bodies["plant"].operations),
             "signals_meaning": self._signals_meaning(),
@@ -261,57 +274,55 @@ class TypedInterface:
         }
 
     def _remembering(self) -> dict[str, str]:
-        """What there is of a controller's states, and of other things that not every controller has."""
+        """What there is of the controller's states in springline.h and springline.c: nothing where it has none."""
+        system, period = self.export.system, f"{self.export.period:g} s"
+        outcome = (
+            "Whatever happens *command is set: to the fallback if the status is not SPRINGLINE_OK. diagnostics may be "
+            "NULL; it is zero if the status is not SPRINGLINE_OK."
+        )
+        late = "too slowly, or with its command too late, it leaves its reference or diverges (README.md says more)."
+        forgets = "Forgets the past of a controller, not its configuration: the last command is zero"
+        if not system.memory:
+            keeps = f"The law keeps no state from step to step, but the arm does: sampled {late}"
+            return {
+                **dict.fromkeys(_OF_MEMORY, ""),
+                "step_meaning": _wrapped(f"Computes the command for one sample. {keeps} {outcome}"),
+                "kept": "The last command is kept.",
+                "forgetting": _wrapped(f"{forgets}, as after springline_init."),
+            }
+        start = ", ".join(constant_expression(value, self.export.real) for value in system.z_start)
+        texts = (
+            "/* The controller's states: what it remembers from sample to sample. */\n"
+            f"typedef struct springline_memory {{\n{self._fields('memory')}\n}} springline_memory;\n\n",
+            "  springline_memory z;\n",
+            f"static const springline_memory springline_initial_memory = {{{start}}};\n",
+            "  controller->z = springline_initial_memory;\n",
+            ", springline_memory *ahead",
+            ", const springline_memory *ahead",
+            "  springline_memory ahead = springline_initial_memory;\n",
+            ", &ahead",
+            "    controller->z = ahead;\n",
+        )
+        moves = (
+            f"Computes the command for one sample and moves the controller's states on by {period}: call it at this "
+            f"period, the exported scenario's. The arm goes on in between: sampled {late}"
+        )
+        return {
+            **dict(zip(_OF_MEMORY, texts, strict=True)),
+            "step_meaning": _wrapped(f"{moves} {outcome} In that case the states stay as they were."),
+            "kept": "The last command and the controller's states are kept.",
+            "forgetting": _wrapped(f"{forgets} and the states are the initial ones, as after springline_init."),
+        }
+
+    def _diagnostics_meaning(self) -> str:
         system = self.export.system
+        parts = len(system.command_parts)
         shown = ["tracking error e", *(["sliding variable sigma"] if system.sliding else [])]
-        count = len(system.command_parts)
-        shown.append("the two parts of U" if count == 2 else "the parts of U" if count > 1 else "U before its limit")
+        shown.append("the two parts of U" if parts == 2 else "the parts of U" if parts > 1 else "U before its limit")
         limits = "saturated where U_max has limited U"
         if system.controller.law:
             limits += ", a_limited where a_max has limited the acceleration that the reaching law wished"
-        why = f"Why: {', '.join(shown)}, and whether a limit was met (0 or 1): {limits}."
-        blocks = {"diagnostics_meaning": _wrapped(why)}
-        outcome = (
-            "Whatever happens *command is set: to the fallback if the status is not SPRINGLINE_OK. diagnostics may be NULL; "
-            "it is zero if the status is not SPRINGLINE_OK."
-        )
-        forgets = "Forgets the past of a controller, not its configuration:"
-        if not system.memory:
-            empty = ("memory_struct", "controller_memory", "initial_memory", "forget", "ahead_parameter")
-            empty += ("ahead_checked", "ahead_local", "ahead_argument", "keep_ahead")
-            text = (
-                "Computes the command for one sample. The law keeps no state from step to step, but the arm does: sampled "
-                "too slowly, or with its command too late, it leaves its reference or diverges (README.md says more)."
-            )
-            return {
-                **blocks,
-                **dict.fromkeys(empty, ""),
-                "step_meaning": _wrapped(f"{text} {outcome}"),
-                "kept": "The last command is kept.",
-                "forgetting": _wrapped(f"{forgets} the last command is zero, as after springline_init."),
-            }
-        zeros = ", ".join(constant_expression(value, self.export.real) for value in system.z_start)
-        return {
-            **blocks,
-            "memory_struct": "/* The controller's states: what it remembers from sample to sample. */\n"
-            f"typedef struct springline_memory {{\n{self._fields('memory')}\n}} springline_memory;\n\n",
-            "controller_memory": "  springline_memory z;\n",
-            "initial_memory": f"static const springline_memory springline_initial_memory = {{{zeros}}};\n",
-            "forget": "  controller->z = springline_initial_memory;\n",
-            "ahead_parameter": ", springline_memory *ahead",
-            "ahead_checked": ", const springline_memory *ahead",
-            "ahead_local": "  springline_memory ahead = springline_initial_memory;\n",
-            "ahead_argument": ", &ahead",
-            "keep_ahead": "    controller->z = ahead;\n",
-            "step_meaning": _wrapped(
-                f"Computes the command for one sample and moves the controller's states on by {self.export.period:g} s: "
-                "call it at this period, that of the exported scenario. Sampled too slowly, or with its command too late, "
-                f"the arm leaves its reference or diverges (README.md says more). {outcome} If it fails, the states stay as "
-                "they were."
-            ),
-            "kept": "The last command and the states are kept.",
-            "forgetting": _wrapped(f"{forgets} command zero, states as at first, as after springline_init."),
-        }
+        return _wrapped(f"Why: {', '.join(shown)}, and whether a limit was met (0 or 1): {limits}.")
 
     def _table_data(self, name: str, time: str) -> list[str]:
         """Statements that look up what body `name` reads of the tables."""

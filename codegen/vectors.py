@@ -162,14 +162,16 @@ def _control_rows(interface: TypedInterface, model: _Model) -> Iterator[list[flo
 
 
 def _limits_met(export: Export, model: _Model, outputs: Sequence[Numbers]) -> Iterator[float]:
-    """Per joint whether U_max has limited the command (0 or 1), then whether a_max has limited the law, if there is one.
+    """Per joint whether U_max has limited the command (0 or 1), then whether a_max has limited a reaching law.
 
     outputs  of the model's control: the command, the parts it is the sum of, error, sliding variable
     """
     u, *parts = outputs[: 1 + len(export.system.command_parts)]
     yield from (u != reduce(operator.add, parts)).astype(float)
     law = export.system.controller.law
-    for i, value in enumerate(outputs[-1] if law else ()):
+    if law is None:
+        return
+    for i, value in enumerate(outputs[-1]):
         [wished] = model(f"law_{law.name}", np.array([value], model.dtype))
         yield float(abs(wished[0]) > model.dtype(export.value(f"control.a_max.{i}")))
 

@@ -9,10 +9,11 @@ in every stage, or once a sample. An effect stands at `sense`, `delay` or `actua
 part of its Functions, and so of all that is printed from them: the batch kernel, the exported C, FMUs and test vectors.
 What no structure names is nowhere printed.
 
-What an effect remembers belongs to the plant, not to the controller: entries behind the plant's own in springline_state,
-set by springline_start and moved on by springline_plant_step. A lag is integrated with the plant. The line of a delay
-is moved on once a step, after it: it is no part of the differential equation, so in the loop it stands where a sampled
-controller's z does, behind the states that are integrated. No effect that remembers is there yet.
+What an effect remembers belongs to the plant, not to the controller: entries behind the plant's own in
+springline_state, set by springline_start and moved on by springline_plant_step. A lag is integrated with the plant. The
+line of a delay is moved on once a step, at its end: it is no part of the differential equation, so in the loop it
+stands where a sampled controller's z does, behind the states that are integrated. No effect that remembers is there
+yet.
 """
 
 from __future__ import annotations
