@@ -21,7 +21,6 @@ from springline.codegen.kernel import METRICS, KernelOptions, KernelSpec, LoopSe
 from springline.codegen.manifest import write_tree
 from springline.model.control import CONTROLLERS
 from springline.model.controller import ArmModel, Control, Controller, Rates
-from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import NON_NEGATIVE, POSITIVE, Parameter, Values
 from springline.model.quantities import SIGMA, Quantity
 from springline.model.system import Structure, System
