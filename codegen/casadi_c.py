@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
+from springline.codegen.literals import literal
 from springline.codegen.program import Program
 
 
@@ -55,8 +56,22 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
     flat = "(const double *)"
     w, s = f"{flat}now.varying", f"{flat}now.varying + SL_NUMBER_W"
     x, p, r = f"{flat}x", f"{flat}p", f"{flat}r"
+    states, memory = program.size("x"), program.size("z")
+    at = (x, f"{flat}(x + {states})") if memory else (x,)  # z stands behind the plant's state
     state = "sl_time now, const sl_group *x, const sl_group *p, const sl_group *r"
     computed = "sl_group *u, sl_group *e, sl_group *sigma, sl_group *wished"
+    results = ["(double *)u", "(double *)e", "(double *)sigma", "(double *)wished"]
+    begin = "".join(
+        f"\n  x[{states + k}][0] = slv_set({literal(value)});" for k, value in enumerate(program.system.z_start)
+    )
+    control = call("control", w, s, *at, p, r, results=results)
+    sampling, sampled, sample = state, computed, control
+    closed = "  kernel_control(now, x, p, r, u, e, sigma, wished);"
+    if memory:
+        sampling, sampled = state.replace("*x,", "*x, double period,"), f"{computed}, sl_group *ahead"
+        update = call("update", w, s, *at, "&period", p, r, results=["(double *)ahead"])
+        rates = call("rates", w, s, *at, p, r, results=[f"(double *)(dx + {states})"])
+        sample, closed = f"{control}\n{update}", f"{control}\n{rates}"
     text = f"""{preamble}
 enum {{ SL_NUMBER_W = {program.size("w")} }};
 
@@ -68,7 +83,7 @@ static inline void kernel_run(const sl_group *p, sl_group *r) {{
 }}
 
 static inline void kernel_start(double t, const double *d, const sl_group *p, const sl_group *r, sl_group *x) {{
-{call("start", "&t", "d", p, r, results=["(double *)x"])}
+{call("start", "&t", "d", p, r, results=["(double *)x"])}{begin}
 }}
 
 static inline void kernel_uniform(const double *t, const double *d, sl_v *uniform) {{}}
@@ -88,11 +103,11 @@ static inline void kernel_signals(sl_time now, const sl_group *p, const sl_group
 }}
 
 static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
-{call("error", w, s, x, p, r, results=["(double *)e", "(double *)sigma"])}
+{call("error", w, s, *at, p, r, results=["(double *)e", "(double *)sigma"])}
 }}
 
-static inline void kernel_control({state}, {computed}) {{
-{call("control", w, s, x, p, r, results=["(double *)u", "(double *)e", "(double *)sigma", "(double *)wished"])}
+static inline void kernel_control({sampling}, {sampled}) {{
+{sample}
 }}
 
 static inline void kernel_plant(sl_time now, const sl_group *x, const sl_group *u, const sl_group *p, const sl_group *r,
@@ -101,7 +116,7 @@ static inline void kernel_plant(sl_time now, const sl_group *x, const sl_group *
 }}
 
 static inline void kernel_closed({state}, sl_group *dx, {computed}) {{
-  kernel_control(now, x, p, r, u, e, sigma, wished);
+{closed}
   kernel_plant(now, x, (const sl_group *)u, p, r, dx);
 }}
 """

@@ -17,12 +17,16 @@ from springline.codegen.literals import Real
 from springline.codegen.manifest import canonical_json
 from springline.codegen.names import check_prefix
 from springline.codegen.nearest import nearest
+from springline.codegen.numbers import real as number
 from springline.codegen.program import count_operations
 from springline.codegen.tables import Table
 from springline.model.parameters import Slot
 from springline.model.quantities import BASE, DDQ1, DERIVATIVES, REFERENCE, SIGMA, E, Quantity, T, entries
 from springline.model.sliding import LAWS
 from springline.model.system import Structure, System
+
+PERIOD = 1e-3
+"""s between two commands, unless an Export says otherwise."""
 
 MODEL_FUNCTIONS = (
     "mass_matrix",
@@ -36,6 +40,8 @@ MODEL_FUNCTIONS = (
     "slow_control",
     "fast_control",
     "control",
+    "rates",
+    "update",
     *(f"law_{name}" for name in LAWS),
 )
 """Functions of a System that an export offers under <prefix>_<name>."""
@@ -60,6 +66,7 @@ class Export:
     prefix   of every public name
     real     number type of the C
     tables   data of the system's table signals, in the order of System.tables; () leaves them out, they are zero then
+    period   s between two commands: what the states of a controller that has some are moved on by
     """
 
     system: System
@@ -68,6 +75,7 @@ class Export:
     prefix: str = "springline"
     real: Real = "double"
     tables: tuple[Table, ...] = ()
+    period: float = PERIOD
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -119,7 +127,7 @@ class Export:
     @cached_property
     def sha256(self) -> str:
         """Hash of model, parameters and options: it changes if and only if the exported files may."""
-        identity = {
+        identity: dict[str, object] = {
             "model": [_instructions(function) for function in self.system.functions.values()],
             "structure": asdict(self.system.structure),
             "parameters": {slot.key: value for slot, value in zip(self.slots, self.values, strict=True)},
@@ -131,6 +139,8 @@ class Export:
                 for table in self.tables
             ],
         }
+        if self.system.controller.states:  # nothing else depends on it
+            identity["period"] = self.period
         return hashlib.sha256(canonical_json(identity)).hexdigest()
 
 
@@ -147,7 +157,12 @@ def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
     state = of(*system.drive.state)
     return {
         **{item.name: of(item) for item in (*system.drive.state, DDQ1, *REFERENCE, E, SIGMA)},
-        **{name: force(name) for name in ("u", "u_s", "u_f", "G", "C_dq1", "S", "z_bar", "eta")},
+        "z": [(entry.name, entry.unit) for entry in system.memory],
+        "z_next": [(f"{entry.name}_next", entry.unit) for entry in system.memory],
+        "dz": [(f"d{entry.name}", f"{entry.unit}/s") for entry in system.memory],
+        "h": [("h", "s")],
+        **{item.name.lower(): force(item.name.lower()) for item in system.command_parts},
+        **{name: force(name) for name in ("u", "u_s", "G", "C_dq1", "S", "z_bar", "eta", "u_f")},
         "dsigma": [(f"d{name}", f"{unit}^2") for name, unit in of(SIGMA)],
         "ddeta": force("ddeta", "/s^2"),
         **{name: of(item) for name, item in zip(("b", "db", "ddb"), BASE, strict=True)},
@@ -171,6 +186,7 @@ def bind(
     prefix: str = "springline",
     real: Real = "double",
     tables: Sequence[Table] = (),
+    period: float = PERIOD,
 ) -> Export:
     """The Export of a structure with these numbers.
 
@@ -180,6 +196,7 @@ def bind(
     prefix     of every public name
     real       number type of the C
     tables     data of the table signals, in the order of System.tables, for real = "double"; () leaves them out
+    period     s between two commands, which the states of a controller go by
     Raises ValueError for a wrong number of values or tables, a value out of its bounds, an unknown name or an unusable
     prefix.
     """
@@ -195,7 +212,8 @@ def bind(
         raise ValueError(f"real is {real!r}, expected 'double' or 'float'")
     if tables and (len(tables) != len(system.tables) or real != "double"):
         raise ValueError(f"{len(tables)} tables in {real}, expected {len(system.tables)} in double")
-    return Export(system, numbers, _tunable(system.slots, tunable), prefix, real, tuple(tables))
+    seconds = number("period", period, positive=True)
+    return Export(system, numbers, _tunable(system.slots, tunable), prefix, real, tuple(tables), seconds)
 
 
 _STRUCTURE = frozenset(f"control.{key}" for key in ("law", "log_form", "mode", "period", "fast", "l", "m", "p", "r"))

@@ -12,11 +12,13 @@ from collections.abc import Mapping
 from importlib import resources
 from importlib.metadata import version
 
-from springline.codegen.export import Export, comment, provenance
+from springline.codegen.export import PERIOD, Export, comment, provenance
 from springline.codegen.literals import literal
 from springline.codegen.tables import print_tables
 from springline.codegen.typed import STATUS, TypedInterface
 from springline.codegen.vectors import TIME_STEP, control_outputs
+
+_ROW = 0.01  # s between the rows that main prints
 
 
 def text_files(export: Export, interface: TypedInterface) -> dict[str, bytes]:
@@ -88,6 +90,7 @@ def _main_blocks(interface: TypedInterface) -> dict[str, str]:
     missing = interface.missing_tables.replace("zero here", "main runs with zero")
     digits = "9" if interface.export.real == "float" else "17"
     return {
+        **_timing(interface.export),
         "digits": digits,
         "table_warning": f'  fprintf(stderr, "main: {missing}\\n");\n' if missing else "",
         "csv_header": ",".join(["t", *(name for _, name in shown)]),
@@ -110,6 +113,12 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
     of_diagnostics = {field.name: field for field in structures["diagnostics"]}
     states = [field.name for field in structures["state"]]
     measured = [field.name for field in structures["measurement"]]
+    memory = [field.name for field in structures.get("memory", ())]
+    places = [f"command.{name}" for name in outputs[:n]]
+    places += [
+        f"{'(springline_real)' if of_diagnostics[name].integer else ''}diagnostics.{name}"
+        for name in outputs[n : len(outputs) - len(memory)]
+    ]
     tunable = export.tunable_slots
     call = [f"  {export.real} x[{len(states)}] = {{{literal(0.0, export.real)}}};"]
     bad_parameter = []
@@ -124,8 +133,10 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         ]
         members = [f"springline_default_config.parameters.{slot.symbol}" for slot in tunable]
         call += [f"  {export.real} p[{len(tunable)}];"]
-    parts = 3 + len(export.system.command_parts)  # the model's control gives the command, these, error, sigma
-    pointers = [f"in + {k * n}" for k in range(3)] + ["x"] + (["p"] if tunable else [])
+    # The model's control gives the command, its parts, error, and sigma where there is one.
+    parts = 2 + len(export.system.command_parts) + len(export.system.sliding)
+    z = [f"in + {3 * n + len(measured)}"] if memory else []
+    pointers = [f"in + {k * n}" for k in range(3)] + ["x", *z] + (["p"] if tunable else [])
     call += [
         f"  const {export.real} *arg[{len(pointers)}] = {{0}};",
         f"  {export.real} *res[{parts}] = {{0}};",
@@ -139,7 +150,8 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "bits": "32" if single else "64",
         "bits_type": "uint32_t" if single else "uint64_t",
         "strto": "strtof" if single else "strtod",
-        "control_in": str(3 * n + len(measured)),
+        "control_in": str(3 * n + len(measured) + len(memory)),
+        **_memory_check(memory),
         "control_out": str(len(outputs)),
         "command_out": str(n),
         "model_out": str(parts * n),
@@ -154,17 +166,58 @@ def _check_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
         "plant_output_names": ", ".join(f'"{name}"' for name in states),
         "plant_time_step": literal(TIME_STEP, export.real),
         "control_from_vector": filled(reference="reference->", measurement="measurement->"),
-        "control_to_vector": taken(
-            [
-                f"command.{name}"
-                if name not in of_diagnostics
-                else f"{'(springline_real)' if of_diagnostics[name].integer else ''}diagnostics.{name}"
-                for name in outputs
-            ]
-        ),
+        "control_to_vector": taken(places + [f"controller->z.{name}" for name in memory]),
         "model_call": "\n".join(call),
         "plant_from_vector": filled(base="base[0].", state="state.", command="command."),
         "plant_to_vector": taken([f"state.{name}" for name in states]),
+    }
+
+
+def _calling(export: Export) -> str:
+    """How often a controller wants to be called."""
+    if not export.system.memory:
+        return (
+            "How fast to call `springline_step`: the law keeps no state between samples, but the springs do, and a "
+            "command that comes too\nseldom or too late destabilises them."
+        )
+    return (
+        f"Call `springline_step` every {1e3 * export.period:g} ms: by so much it moves the controller's states on. A "
+        "command that comes too\nseldom or too late destabilises the arm."
+    )
+
+
+def _memory_check(memory: list[str]) -> dict[str, str]:
+    """What self_check looks at of a controller's states: before a sample they are those of the vector."""
+    names = ("memory_enum", "memory_check", "memory_local", "memory_seen", "kept", "again")
+    if not memory:
+        return dict.fromkeys(names, "")
+    taken = "".join(f"  got[{k}] = controller->z.{name};\n" for k, name in enumerate(memory))
+    differ = [f"controller->z.{name} != z.{name}" for name in memory]
+    return {
+        "memory_enum": f"       MEMORY = {len(memory)},\n",
+        "memory_check": taken + '  if (differs("the states before springline_step", line,\n'
+        "              control_outputs + CONTROL_OUT - MEMORY, MEMORY, in + CONTROL_IN - MEMORY, got)) {\n"
+        "    return 1;\n"
+        "  }\n",
+        "memory_local": "  springline_memory z;\n",
+        "memory_seen": "  z = controller->z;\n",
+        "kept": " || ".join(differ) + " ||\n      ",
+        "again": "springline_reset(controller) != SPRINGLINE_OK || ",
+    }
+
+
+def _timing(export: Export) -> dict[str, str]:
+    """How main samples and steps: at the period of a controller that has states, else at a usual one."""
+    period = export.period if export.system.memory else PERIOD
+    steps = max(round(period / TIME_STEP), 1)
+    step = TIME_STEP if steps * TIME_STEP == period else period / steps
+    return {
+        "period_text": f"{1e3 * period:g} ms",
+        "step_text": f"{1e3 * step:g} ms",
+        "step": "1e-4" if step == TIME_STEP else repr(step),
+        "steps_per_sample": str(steps),
+        "samples_per_row": str(max(round(_ROW / period), 1)),
+        "samples_per_second": str(round(1 / period)),
     }
 
 
@@ -179,6 +232,8 @@ def _readme_blocks(export: Export, interface: TypedInterface) -> dict[str, str]:
             if interface.missing_tables
             else f"`{export.prefix}_signals` has the scenario's reference and base motion."
         ),
+        "calling": _calling(export),
+        "sampled": "millisecond" if _timing(export)["period_text"] == "1 ms" else _timing(export)["period_text"],
         "sampling": f"{export.system.mechanism.sampling}\n" if export.system.mechanism.sampling else "",
         "provenance": "  \n".join(provenance(export)),
         "field_table": "\n".join(

@@ -65,9 +65,9 @@ def fmu(
     wanted = bind(structure, values, tunable=tunable).tunable
     keys = [system.slots[i].key for i in part_parameters(system, part) if i in set(wanted)]
     needed = () if part == "controller" else tables
-    export = bind(structure, values, tunable=keys, prefix=identifier, tables=needed)
+    export = bind(structure, values, tunable=keys, prefix=identifier, tables=needed, period=settings.sample)
     typed = TypedInterface(export)
-    shown = interface(export, typed, part)
+    shown = interface(export, typed, part, sampled=part == "controller" or settings.period > 0.0)
     code = sources(export, typed, shown, settings, version)
     describe = partial(
         model_description, shown, settings, version, identifier=identifier, name=name, description=description(shown)

@@ -113,7 +113,7 @@ def _list(numbers: Iterable[int]) -> str:
 
 def _variable_2(parent: ET.Element, reference: int, variable: Variable) -> None:
     attributes = {"name": variable.name, "valueReference": str(reference), **_common(variable)}
-    if variable.causality in ("parameter", "output"):
+    if variable.causality in ("parameter", "output", "local"):
         attributes["initial"] = "exact" if variable.causality == "parameter" else "calculated"
     element = ET.SubElement(parent, "ScalarVariable", attributes)
     ET.SubElement(element, "Boolean" if variable.boolean else "Real", _numbers(variable))
@@ -121,7 +121,7 @@ def _variable_2(parent: ET.Element, reference: int, variable: Variable) -> None:
 
 def _variable_3(parent: ET.Element, reference: int, variable: Variable) -> None:
     attributes = {"name": variable.name, "valueReference": str(reference), **_common(variable), **_numbers(variable)}
-    if variable.causality == "output":
+    if variable.causality in ("output", "local"):
         attributes["initial"] = "calculated"
     ET.SubElement(parent, "Boolean" if variable.boolean else "Float64", attributes)
 

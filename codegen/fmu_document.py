@@ -15,6 +15,13 @@ th, td { text-align: left; padding: 0.2em 1em 0.2em 0; border-bottom: 1px solid 
 code { font-size: 0.95em; }
 """
 
+_CAUSALITIES = {
+    "Inputs": "input",
+    "Outputs": "output",
+    "States of the controller": "local",
+    "Parameters": "parameter",
+}
+
 _WHAT = {
     "controller": "The control law of an arm on a moving base: references and measurements in, motor commands out.",
     "plant": "An arm on a moving base: motor commands in, its state out.",
@@ -52,7 +59,7 @@ def document(
         f"<code>-DFMI{version}_FUNCTION_PREFIX={identifier}_</code>; for a shared one leave the prefix undefined.",
     ]
     sections = []
-    for title, causality in (("Inputs", "input"), ("Outputs", "output"), ("Parameters", "parameter")):
+    for title, causality in _CAUSALITIES.items():
         chosen = [variable for variable in interface.variables if variable.causality == causality]
         if not chosen:
             continue
@@ -97,7 +104,10 @@ def _stepping(export: Export, interface: Interface, settings: Settings) -> list[
         return [
             f"The command is {sampled}; at a sample it belongs to the inputs of that time (feedthrough)."
             if sampled
-            else "The command belongs to the inputs of its own time (feedthrough); the law has no state.",
+            else "The command belongs to the inputs of its own time (feedthrough); the law has no state."
+            if "memory" not in interface.blocks
+            else f"The command is computed every {settings.step:g} s, the scenario's step, and held in between; it "
+            "belongs to the inputs of its own time (feedthrough). So often the controller's states are moved on.",
             "At a communication point, set the inputs and get the command before the plant steps. A tool that "
             "exchanges values only after a step delays the command by that step, and a delay can make the loop "
             f"unstable: choose a step as short as the default experiment's, {settings.step:g} s, or one of which half "

@@ -16,7 +16,7 @@ class Settings:
     duration  of the default experiment, s
     step      of the plant's integrator, s
     period    sample period of the control, a whole number of steps, s; 0 for continuous control
-    bound     largest |x_i| of the plant, SI units
+    bound     largest |x_i| of the plant and |z_i| of the controller, SI units
     until     where the scenario's signals end, s
     """
 
@@ -25,3 +25,13 @@ class Settings:
     period: float = 0.0
     bound: float = 1e6
     until: float = math.inf
+
+    @property
+    def hold(self) -> int:
+        """Steps per sample of the control, 0 where it is continuous."""
+        return round(self.period / self.step)
+
+    @property
+    def sample(self) -> float:
+        """What a controller's states are moved on by, s: as the loop counts it, whole steps."""
+        return max(self.hold, 1) * self.step

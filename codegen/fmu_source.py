@@ -74,12 +74,14 @@ def _model(
 ) -> str:
     part, system = interface.part, export.system
     if part == "controller":  # its signals come from outside
-        grid, grid_meaning = settings.period, "s, sample period; 0: at every time"
+        # The states of a controller go on once a sample: without samples, once a step of the scenario.
+        grid = settings.period or (settings.step if "memory" in interface.blocks else 0.0)
+        grid_meaning = "s, sample period; 0: at every time"
         until = math.inf
     else:
         grid, grid_meaning = settings.step, "s, step of the integrator"
         until = settings.until
-    hold = round(settings.period / settings.step)
+    memory = len(system.memory) if "memory" in interface.blocks else 0
     lines = [
         "#include <stdint.h>",
         "",
@@ -96,18 +98,19 @@ def _model(
                 ("FMU_NO_LIMIT", NO_LIMIT, "stands for infinity, as do greater numbers"),
             )
         ),
-        f"#define FMU_HOLD {hold} /* steps per sample of the control, 0: continuous */",
+        f"#define FMU_HOLD {settings.hold} /* steps per sample of the control, 0: continuous */",
         f"#define FMU_BASE_IS_INPUT {int(base_is_input(system, part))}",
+        f"#define FMU_MEMORY {memory} /* states of the controller */",
         "",
         "enum {",
         f"  FMU_VALUES = {len(interface.variables)},",
         f"  FMU_STATES = {len(typed.structures['state'])},",
-        f"  FMU_JOINTS = {system.n},",
         f"  FMU_DIAGNOSTICS = {len(typed.structures['diagnostics'])},",
+        f"  FMU_CURRENT = {(1 + len(system.sliding)) * system.n}, /* the first diagnostics, e and sigma: never held */",
         ",\n".join(f"  FMU_AT_{name.upper()} = {place}" for name, place in interface.blocks.items()),
         "};",
         "",
-        "enum { FMU_INDEPENDENT, FMU_PARAMETER, FMU_INPUT, FMU_OUTPUT };",
+        "enum { FMU_INDEPENDENT, FMU_PARAMETER, FMU_INPUT, FMU_OUTPUT, FMU_LOCAL };",
         "",
         "typedef struct {",
         "  const char *name;",
@@ -147,6 +150,8 @@ def _copies(export: Export, typed: TypedInterface, interface: Interface) -> list
         "plant": ["get_command", "get_state", "put_state", "put_base" if inside else "get_base"],
         "loop": ["put_reference", "put_command", "put_diagnostics", "put_state", "put_base" if inside else "get_base"],
     }[interface.part]
+    if "memory" in interface.blocks:
+        names += ["get_memory", "put_memory"]
     lines = []
     for name in names:
         direction, _, structure = name.partition("_")
@@ -198,20 +203,25 @@ def _glue(export: Export, typed: TypedInterface, interface: Interface, settings:
 
 def _closed_step(export: Export, typed: TypedInterface) -> list[str]:
     """A step in which every stage has a command of its own, with the bits of the simulation loop."""
-    tableau, states = export.system.tableau, len(typed.structures["state"])
+    tableau, plant, memory = export.system.tableau, len(typed.structures["state"]), len(export.system.memory)
+
+    failed = "if (status != SPRINGLINE_OK) return status;"
 
     def evaluate(when: int, at: str, slope: str) -> list[str]:
+        rates = [f"status = fmu_rates(fmu, &reference[{when}], {at}, {slope} + FMU_STATES);", failed]
         return [
-            f"status = fmu_control(fmu, &reference[{when}], {at}, &command, &diagnostics);",
-            "if (status != SPRINGLINE_OK) return status;",
+            f"status = fmu_control(fmu, &reference[{when}], {at}, NULL, &command, &diagnostics);",
+            failed,
             f"springline_evaluate_plant(&fmu->controller, &base[{when}], {at}, &command, {slope});",
+            *(rates if memory else []),
         ]
 
-    work = "".join(f", {name}[FMU_STATES]" for name in ("at", *scalar_slopes(tableau)))
+    work = "".join(f", {name}[FMU_STATES + FMU_MEMORY]" for name in ("at", *scalar_slopes(tableau)))
     return [
-        "static int fmu_control(fmu_core *fmu, const springline_reference *reference, const double *x,",
+        "static int fmu_control(fmu_core *fmu, const springline_reference *reference, const double *x, double *ahead,",
         "                       springline_command *command, springline_diagnostics *diagnostics);",
         "",
+        *_rates(typed),
         "/* The loop from x to next. */",
         "static int fmu_closed_step(fmu_core *fmu, const springline_reference *reference, const springline_base *base,",
         "                           const double *x, double *next, double step) {",
@@ -219,7 +229,30 @@ def _closed_step(export: Export, typed: TypedInterface) -> list[str]:
         "  springline_diagnostics diagnostics;",
         f"  double {work.removeprefix(', ')};",
         "  int status, i;",
-        *(f"  {line}" for line in scalar_stages(tableau, export.real, states, evaluate)),
+        *(f"  {line}" for line in scalar_stages(tableau, export.real, plant + memory, evaluate)),
         "  return SPRINGLINE_OK;",
         "}",
+    ]
+
+
+def _rates(typed: TypedInterface) -> list[str]:
+    """A function that computes the rates of the controller's states, where it has some."""
+    if typed.rates is None:
+        return []
+    return [
+        "/* dz/dt of the controller's states, which stand behind the plant's in x. */",
+        "static int fmu_rates(fmu_core *fmu, const springline_reference *reference, const double *x, double *dz) {",
+        "  springline_controller *controller = &fmu->controller;",
+        "  springline_measurement seen, *measurement = &seen;",
+        "  springline_state state;",
+        "  int status;",
+        "  fmu_get_state(x, &state);",
+        "  fmu_get_memory(x + FMU_STATES, &controller->z);",
+        "  status = springline_measure(controller, &state, measurement);",
+        "  (void)reference;",
+        "  if (status != SPRINGLINE_OK) return status;",
+        *(f"  {line}" for line in typed.rates.lines),
+        "  return SPRINGLINE_OK;",
+        "}",
+        "",
     ]

@@ -15,7 +15,7 @@ from springline.model.parameters import REAL, Bounds
 from springline.model.system import System
 
 Part = Literal["controller", "plant", "loop"]
-Causality = Literal["independent", "parameter", "input", "output"]
+Causality = Literal["independent", "parameter", "input", "output", "local"]
 
 PARTS: tuple[Part, ...] = ("controller", "plant", "loop")
 
@@ -32,6 +32,7 @@ class Variable:
     name    a parameter's is the scenario's key, another's that of the trajectory's column
     start   start value, None where it is computed
     fixed   a parameter that counts at initialization only
+    sampled  whether it changes at samples only
     """
 
     name: str
@@ -42,13 +43,14 @@ class Variable:
     bounds: Bounds = REAL
     fixed: bool = False
     boolean: bool = False
+    sampled: bool = False
 
     @property
     def variability(self) -> str:
         """FMI's word for when it may change."""
         if self.causality == "parameter":
             return "fixed" if self.fixed else "tunable"
-        return "discrete" if self.boolean else "continuous"
+        return "discrete" if self.boolean or self.sampled else "continuous"
 
     @property
     def expected(self) -> str:
@@ -94,11 +96,13 @@ def base_is_input(system: System, part: Part) -> bool:
 
 def part_parameters(system: System, part: Part) -> tuple[int, ...]:
     """Indices of the slots that a part depends on, ascending."""
+    names = ("control", "rates", "update") if system.memory else ("control",)
+    control = {i for name in names for i in _read(system, name)}
     if part == "controller":
-        return _read(system, "control")
+        return tuple(sorted(control))
     used = {*_read(system, "plant"), *_read(system, "start")}
     if part == "loop":
-        used |= set(_read(system, "control"))
+        used |= control
     signals = {
         i for i in _read(system, "signals") if part == "loop" or not system.slots[i].key.startswith("reference.")
     }
@@ -116,8 +120,11 @@ def _read(system: System, name: str) -> tuple[int, ...]:
     return tuple(sorted(entry for source, entry in reads if source == function.n_in() - 1))
 
 
-def interface(export: Export, typed: TypedInterface, part: Part) -> Interface:
-    """The variables of a part: time, its tunable parameters, inputs, outputs."""
+def interface(export: Export, typed: TypedInterface, part: Part, *, sampled: bool) -> Interface:
+    """The variables of a part: time, its tunable parameters, inputs, outputs, and the states of its controller.
+
+    sampled  whether the controller's states change at samples only
+    """
     outside = base_is_input(export.system, part)
     inputs: dict[Part, Sequence[str]] = {
         "controller": ("reference", "measurement"),
@@ -129,6 +136,8 @@ def interface(export: Export, typed: TypedInterface, part: Part) -> Interface:
         "plant": ("state", *([] if outside else ["base"])),
         "loop": ("state", "reference", "command", "diagnostics", *([] if outside else ["base"])),
     }
+    # A controller's states stand behind the plant's: what is integrated is one piece.
+    last = {"controller": "diagnostics", "plant": "", "loop": "state"}[part]
     variables = [Variable("time", "s", "time", "independent")]
     blocks = {"parameters": len(variables)}
     for slot, i in zip(export.tunable_slots, export.tunable, strict=True):
@@ -140,10 +149,13 @@ def interface(export: Export, typed: TypedInterface, part: Part) -> Interface:
         for structure in structures:
             blocks[structure] = len(variables)
             variables += [_signal(field, causality) for field in typed.structures[structure]]
+            if structure == last and "memory" in typed.structures:
+                blocks["memory"] = len(variables)
+                variables += [_signal(field, "local", sampled=sampled) for field in typed.structures["memory"]]
     return Interface(part, tuple(variables), blocks)
 
 
-def _signal(field: Field, causality: Causality) -> Variable:
+def _signal(field: Field, causality: Causality, *, sampled: bool = False) -> Variable:
     start = 0.0 if causality == "input" else None
     unit = "1" if field.integer else field.unit
-    return Variable(field.name, unit, field.meaning, causality, start, boolean=field.integer)
+    return Variable(field.name, unit, field.meaning, causality, start, boolean=field.integer, sampled=sampled)

@@ -171,6 +171,7 @@ class LoopGraph(ValueGraph):
         d = [self.leaf("d", i, Binding.UNIFORM) for i in range(program.size("d"))]
         x = [self.leaf("x", i, Binding.STATE) for i in range(program.size("x"))]
         u = [self.leaf("u", i, Binding.STATE) for i in range(program.size("u"))]
+        z = [[self.leaf("z", i, Binding.STATE) for i in range(program.size("z"))]] if program.size("z") else []
         functions = program.functions
         [r] = self.add("run", functions["run"], [p])
         beginning = [self.leaf("begin", 0, Binding.STATE)]
@@ -178,10 +179,13 @@ class LoopGraph(ValueGraph):
         self.add("start", functions["start"], [beginning, first, p, r])
         [w] = self.add("signals", functions["signals"], [t, d, p, r])
         [s] = self.add("time", functions["time"], [w, p, r])
-        self.add("error", functions["error"], [w, s, x, p, r])
-        [command, *_] = self.add("control", functions["control"], [w, s, x, p, r])
+        self.add("error", functions["error"], [w, s, x, *z, p, r])
+        [command, *_] = self.add("control", functions["control"], [w, s, x, *z, p, r])
         self.add("plant", functions["plant"], [w, s, x, u, p, r])
         self.add("closed", functions["plant"], [w, s, x, command, p, r])
+        if z:
+            self.add("rates", functions["rates"], [w, s, x, *z, p, r])
+            self.add("update", functions["update"], [w, s, x, *z, [self.leaf("h", 0, Binding.STATE)], p, r])
 
     def value_at(self, i: int, parameters: Sequence[float]) -> float | None:
         """Value of a run-time node at given slots' values where exact operations lead there, else None."""

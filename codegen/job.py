@@ -37,7 +37,7 @@ JOB = (
     Member("steps", "int64_t", "N, number of steps of every run"),
     Member("start_time", "double", "s"),
     Member("step", "double", "h, s"),
-    Member("bound", "double", "a run stops when any |x_i| leaves it"),
+    Member("bound", "double", "a run stops when any |x_i| or |z_i| leaves it"),
     Member("hold", "int64_t", "sampled control: steps per sample, >= 1; continuous control ignores it"),
     Member("output_every", "int64_t", "a trajectory row every so many steps, and at the end; 0: no trajectory"),
     Member("response_band", "double", "fraction of |e_i(0)|, 0 where response_error counts"),

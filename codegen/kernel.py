@@ -112,7 +112,7 @@ class Runs:
     """Results, one row a run.
 
     metrics      (runs, joints, len(METRICS)), NaN where there is none
-    final_state  (runs, 4n), the last finite state;  end_time (runs,), s
+    final_state  (runs, states), the last finite state, that of the controller behind the plant's;  end_time (runs,), s
     status       (runs,) index into STATUS
     quantity     (runs,) place in a trajectory row, t not counted, of what left its bound (`quantity_name`), or -1
     trajectory   (runs, rows, columns) or None;  rows (runs,) rows that were written
@@ -184,7 +184,7 @@ class Kernel:
         self._simulate: Any = handle.springline_simulate
         self._simulate.restype = None
         system = program.system
-        self._states, self._columns = system.x.numel(), len(system.trajectory)
+        self._states, self._columns = system.x.numel() + system.z.numel(), len(system.trajectory)
         self.width = _checked_layout(
             handle.springline_layout,
             ctypes.sizeof(Job),

@@ -41,10 +41,11 @@ class KernelSource:
 
 def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: bool, sizes: Mapping[str, int]) -> str:
     """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
+    memory, sliding = program.size("z"), len(program.system.sliding)
     channels = sum(len(table.channels) for table in program.system.tables)
     numbers = {
         "SL_NJ": program.system.n,
-        "SL_NX": program.size("x"),
+        "SL_NX": program.size("x") + memory,
         "SL_NB": len(COORDINATES),
         "SL_NP": sizes["p"],
         "SL_NR": sizes["r"],
@@ -60,6 +61,8 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
 #define SL_G {groups}
 #define SL_PACKS {packs}
 #define SL_SAMPLED {int(sampled)}
+#define SL_NZ {memory}
+#define SL_SLIDING {sliding}
 #include "sl_lanes.h"
 
 typedef sl_v sl_group[SL_G]; /* one quantity of a pack of runs */
@@ -83,7 +86,7 @@ enum {{
 #define SL_EVALUATION static inline
 #endif
 
-{kernel_update(program.system.tableau)}"""
+{kernel_update(program.system.tableau, "SL_NX - SL_NZ" if sampled and memory else "SL_NX")}"""
 
 
 def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:

@@ -86,9 +86,10 @@ class _Emitter:
         self.counts: dict[str, int] = {}
         outputs = self.graph.outputs
         # Later functions are visited first: they decide which earlier values are kept.
+        dz, ahead = ([*outputs["rates"][0]], [*outputs["update"][0]]) if program.size("z") else ([], [])
         self.state_functions = {
-            "closed": [*outputs["closed"][0], *(i for part in outputs["control"] for i in part)],
-            "control": [i for part in outputs["control"] for i in part],
+            "closed": [*outputs["closed"][0], *dz, *(i for part in outputs["control"] for i in part)],
+            "control": [*(i for part in outputs["control"] for i in part), *ahead],
             "error": [i for part in outputs["error"] for i in part],
             "plant": list(outputs["plant"][0]),
         }
@@ -121,6 +122,8 @@ class _Emitter:
             kind, k = node.source
             if node.op is None and kind == "x":
                 names[i] = states[k]
+            elif node.op is None and kind == "z":
+                names[i] = system.memory[k].name
             elif node.op is None and kind == "u":
                 names[i] = f"u_{joints[k]}"
             elif node.op is None and kind == "p":
@@ -323,6 +326,10 @@ class _Emitter:
         name, k = node.source
         if name in ("p", "x", "u"):
             return f"{name}[{k}][{group}]"
+        if name == "z":  # behind the plant's state
+            return f"x[{self.program.size('x') + k}][{group}]"
+        if name == "h":
+            return "slv_set(period)"
         if name in ("begin", "first"):
             return "slv_set(time)" if name == "begin" else f"slv_set(data[{k}])"
         if node.binding is Binding.RUN:
@@ -379,7 +386,10 @@ class _Emitter:
         run, uniform, varying = (list(self.slots[b]) for b in (Binding.RUN, Binding.UNIFORM, Binding.VARYING))
         given = "const sl_group *p, const sl_group *r"
         now = "sl_time now, const sl_group *x"
+        memory = self.program.size("z")
         control = {"u": n, "e": n, "sigma": n, "wished": n}
+        sampling, sample = (f"{now}, double period", control | {"ahead": memory}) if memory else (now, control)
+        begun = [*outputs["start"][0], *map(self.graph.constant, self.program.system.z_start)]
 
         def into(name: str) -> Callable[[int, str], str]:
             return lambda k, g: f"{name}[{k}][{g}]"
@@ -431,7 +441,7 @@ class _Emitter:
                 self._function(
                     "start",
                     f"double time, const double *data, {given}, sl_group *x",
-                    outputs["start"][0],
+                    begun,
                     Binding.STATE,
                     into("x"),
                     self._given,
@@ -466,8 +476,8 @@ class _Emitter:
                     ["g"],
                 ),
                 "/* ---- at every evaluation ---- */\n",
-                state("closed", now, {"dx": states, **control}),
-                state("control", now, control),
+                state("closed", now, {"dx": states + memory, **control}),
+                state("control", sampling, sample),
                 state("error", now, {"e": n, "sigma": n}),
                 state("plant", f"{now}, const sl_group *u", {"dx": states}),
             ]

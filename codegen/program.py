@@ -8,6 +8,11 @@
     control(w, s, x, p, r) -> u, e, sigma, wished   (u as it was before its limit)
     plant(w, s, x, u, p, r) -> dx
 
+and where the controller has states, which error and control then take after x,
+
+    rates(w, s, x, z, p, r) -> dz
+    update(w, s, x, z, h, p, r) -> z_next   (one sample of h seconds later)
+
 Every parameter is symbolic, common subexpressions are shared, and nothing is rewritten after this point: every engine
 prints these instruction lists, which is why every engine computes the same bits.
 """
@@ -32,12 +37,13 @@ class Program:
     functions: dict[str, ca.Function]
 
     def size(self, name: str) -> int:
-        """Number of entries of a vector of the loop: t, d, p, r, w, s, x, u, e."""
+        """Number of entries of a vector of the loop: t, d, p, r, w, s, x, z, u, e."""
         sizes = {
             "p": self.system.p.numel(),
             "d": self.system.d.numel(),
             "w": self.system.w.numel(),
             "x": self.system.x.numel(),
+            "z": self.system.z.numel(),
             "u": self.system.n,
             "e": self.system.n,
             "t": 1,
@@ -63,14 +69,18 @@ def program(structure: Structure) -> Program:
     """Build, stage and freeze the Program of a structure."""
     system = System(structure)
     t, d, w, x, u, p = system.t, system.d, system.w, system.x, system.u, system.p
-    loop = {name: system.function(f"loop_{name}") for name in ("error", "control", "plant")}
+    z = [system.z] if system.controller.states else []
+    later = ("rates", "update") if z else ()
+    loop = {name: system.function(f"loop_{name}") for name in ("error", "control", "plant", *later)}
     sources = {"signals": system.function("signals"), "start": system.function("start"), **loop}
     inputs = {
         "signals": [t, d, p],
         "start": [t, d, p],
-        "error": [w, x, p],
-        "control": [w, x, p],
+        "error": [w, x, *z, p],
+        "control": [w, x, *z, p],
         "plant": [w, x, u, p],
+        "rates": [w, x, *z, p],
+        "update": [w, x, *z, system.h, p],
     }
 
     with as_written():
@@ -91,15 +101,21 @@ def program(structure: Structure) -> Program:
             count = len(staged[name])
             staged[name], late = late[:count], late[count:]
         r, s = run.symbols, time.symbols
+        at, names_at = [w, s, x, *z], ["w", "s", "x", *(["z"] if z else [])]
         signature = {
             "run": ([p], [run.values], ["p"], ["r"]),
             "start": ([t, d, p, r], staged["start"], ["t", "d", "p", "r"], ["x"]),
             "signals": ([t, d, p, r], staged["signals"], ["t", "d", "p", "r"], ["w"]),
             "time": ([w, p, r], [time.values], ["w", "p", "r"], ["s"]),
-            "error": ([w, s, x, p, r], staged["error"], ["w", "s", "x", "p", "r"], ["e", "sigma"]),
-            "control": ([w, s, x, p, r], staged["control"], ["w", "s", "x", "p", "r"], ["u", "e", "sigma", "wished"]),
+            "error": ([*at, p, r], staged["error"], [*names_at, "p", "r"], ["e", "sigma"]),
+            "control": ([*at, p, r], staged["control"], [*names_at, "p", "r"], ["u", "e", "sigma", "wished"]),
             "plant": ([w, s, x, u, p, r], staged["plant"], ["w", "s", "x", "u", "p", "r"], ["dx"]),
         }
+        if z:
+            signature |= {
+                "rates": ([*at, p, r], staged["rates"], [*names_at, "p", "r"], ["dz"]),
+                "update": ([*at, system.h, p, r], staged["update"], [*names_at, "h", "p", "r"], ["z_next"]),
+            }
         functions = {
             name: ca.Function(f"loop_{name}", ins, ca.cse([ca.densify(o) for o in outs]), names_in, names_out)
             for name, (ins, outs, names_in, names_out) in signature.items()

@@ -106,13 +106,23 @@ class ScalarPrinter:
             function.name(): [label for port in export.outputs(function) for label in port.labels]
             for function in functions
         }
-        entries = port_entries(export.system)
+        self._name_inputs()
+
+    def _name_inputs(self) -> None:
+        entries = port_entries(self._export.system)
         self._names = {}
         for i, node in enumerate(self._graph.nodes):
             source, k = node.source
             if node.op is None and node.binding is not Binding.CONSTANT:
                 is_p = source == "p"
-                self._names[i] = export.tunable_slots[k].symbol if is_p else entries[source][k][0]
+                self._names[i] = self._export.tunable_slots[k].symbol if is_p else entries[source][k][0]
+
+    def join(self, name: str, function: ca.Function, **constants: float) -> None:
+        """Let Function `name` also compute the outputs of `function`, after its own; `constants` are inputs of it."""
+        given = {port: [self._graph.constant(value)] for port, value in constants.items()}
+        self._wanted[name] += self._graph.apply(function, **given)
+        self._labels[name] += [label for port in self._export.outputs(function) for label in port.labels]
+        self._name_inputs()
 
     def compose(self, name: str, port: str, function: ca.Function, quantity: str) -> None:
         """Let Function `name` also compute the scalar `function` of every entry of its output `port`.

@@ -114,13 +114,17 @@ def scalar_stages(
         yield "}"
 
 
-def kernel_update(tableau: Tableau) -> str:
-    """What loop.c needs to know of the integrator, in C: its numbers, and kernel_update."""
+def kernel_update(tableau: Tableau, states: str = "SL_NX") -> str:
+    """What loop.c needs to know of the integrator, in C: its numbers, and kernel_update.
+
+    states  how many of the states are integrated, in C
+    """
     kept = kept_slopes(tableau)
     instants = [node for node in tableau.nodes if node < 1.0]
     places = [kept.index(stage) if stage in kept else -1 for stage in range(tableau.stages)]
     cases = "\n".join(
-        f"    case {stage}: {{\n{_kernel_case(tableau, stage)}\n      break;\n    }}" for stage in range(tableau.stages)
+        f"    case {stage}: {{\n{_kernel_case(tableau, stage, states)}\n      break;\n    }}"
+        for stage in range(tableau.stages)
     )
     return f"""/* The integrator: {tableau.title}, order {tableau.order}. */
 enum {{ SL_STAGES = {tableau.stages}, SL_INSTANTS = {len(instants)}, SL_KEPT = {len(kept)} }};
@@ -141,7 +145,7 @@ static inline void kernel_update(int stage, double h, const sl_group *x, sl_grou
 """
 
 
-def _kernel_case(tableau: Tableau, stage: int) -> str:
+def _kernel_case(tableau: Tableau, stage: int, states: str) -> str:
     kept = kept_slopes(tableau)
     gains: dict[float, str] = {}
 
@@ -155,7 +159,7 @@ def _kernel_case(tableau: Tableau, stage: int) -> str:
     return "\n".join(
         [
             *(f"      const sl_v {name} = slv_set({literal(factor)} * h);" for factor, name in gains.items()),
-            "      for (i = 0; i < SL_NX; i++) {",
+            f"      for (i = 0; i < {states}; i++) {{",
             "        for (g = 0; g < SL_G; g++) {",
             *(f"          {line}" for line in lines),
             "        }",

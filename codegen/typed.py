@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ from springline.codegen.literals import Real, constant_expression, literal
 from springline.codegen.scalar import Body, ScalarPrinter
 from springline.codegen.stepping import scalar_slopes, scalar_stages
 from springline.model.parameters import Bounds
-from springline.model.quantities import A_LIMITED, BASE, REFERENCE, SATURATED, SIGMA, E, Quantity, U, entries
+from springline.model.quantities import A_LIMITED, BASE, REFERENCE, SATURATED, E, Quantity, U, entries
 
 STATUS = (
     ("OK", "done"),
@@ -31,6 +32,21 @@ STATUS = (
 _LINE = 120  # characters
 _MATH_STACK = 160  # bytes below the deepest elementary function, as measured on Cortex-M7
 
+_MEMORY = "controller->z."
+
+# Placeholders of what is there only for a controller that has states.
+_OF_MEMORY = (
+    "memory_struct",
+    "controller_memory",
+    "initial_memory",
+    "forget",
+    "ahead_parameter",
+    "ahead_checked",
+    "ahead_local",
+    "ahead_argument",
+    "keep_ahead",
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Field:
@@ -48,24 +64,32 @@ class TypedInterface:
     def __init__(self, export: Export) -> None:
         self.export = export
         system = export.system
-        names = ("measure", "control", "plant", "start", "signals")
+        names = ["measure", "control", "plant", "start", "signals"]
+        remembers = bool(system.memory)
+        names += ["rates"] if remembers else []
         self._printer = ScalarPrinter(export, [system.function(name) for name in names], hoist=True)
-        self._printer.compose("control", "sigma", system.function(f"law_{system.structure.law}"), "dsigma")
-        read = self._printer.reads("control")
+        if remembers:
+            self._printer.join("control", system.function("update"), h=export.period)
+        if system.controller.law:
+            self._printer.compose("control", "sigma", system.function(f"law_{system.controller.law.name}"), "dsigma")
+        read = self._printer.reads("control") | (self._printer.reads("rates") if remembers else frozenset())
 
         def declared(*quantities: Quantity, integer: bool = False) -> tuple[Field, ...]:
             found = entries(quantities, system.joints)
             return tuple(Field(entry.name, entry.unit, entry.meaning, integer) for entry in found)
 
-        numbers = declared(E, SIGMA, *system.command_parts)
+        numbers = declared(E, *system.sliding, *system.command_parts)
+        limits = (SATURATED, A_LIMITED) if system.controller.law else (SATURATED,)
         self.structures: dict[str, tuple[Field, ...]] = {
             "reference": declared(*REFERENCE),
             "measurement": tuple(f for k, f in enumerate(declared(*system.drive.state)) if ("x", k) in read),
             "command": declared(U),
-            "diagnostics": (*numbers, *declared(SATURATED, A_LIMITED, integer=True)),
+            "diagnostics": (*numbers, *declared(*limits, integer=True)),
             "state": declared(*system.drive.state),
             "base": declared(*BASE),
         }
+        if remembers:
+            self.structures["memory"] = declared(*system.controller_states)
         if export.tunable:
             self.structures["parameters"] = tuple(
                 Field(slot.symbol, slot.unit, slot.meaning) for slot in export.tunable_slots
@@ -75,7 +99,10 @@ class TypedInterface:
         state, base = self.structures["state"], self.structures["base"]
         reference, command = self.structures["reference"], self.structures["command"]
         signals = [f"reference->{f.name}" for f in reference] + [f"base->{f.name}" for f in base]
-        seen = [f"diagnostics->{f.name}" for f in (*numbers[2 * system.n :], *numbers[: 2 * system.n])]
+        first = (1 + len(system.sliding)) * system.n  # of the command's parts
+        seen = [f"diagnostics->{f.name}" for f in (*numbers[first:], *numbers[:first])]
+        seen += [f"ahead->{f.name}" for f in self.structures.get("memory", ())]
+        seeing = dict.fromkeys(("q1d", "dq1d", "ddq1d"), "reference->") | {"x": "measurement->", "z": _MEMORY}
         measured = {field.name for field in self.structures["measurement"]}
         self.bodies: dict[str, Body] = {
             "measure": self._printer.body(
@@ -85,7 +112,7 @@ class TypedInterface:
             ),
             "control": self._printer.body(
                 "control",
-                self._load({"q1d": "reference->", "dq1d": "reference->", "ddq1d": "reference->", "x": "measurement->"}),
+                self._load(seeing),
                 [*(f"command->{f.name}" for f in command), *seen],
             ),
             "plant": self._printer.body(
@@ -96,6 +123,11 @@ class TypedInterface:
             "start": self._printer.body("start", self._load({"t": ""}), [f"state->{f.name}" for f in state]),
             "signals": self._printer.body("signals", self._load({"t": ""}), signals),
         }
+        self.rates: Body | None = None
+        """Rates of the controller's states, into dz[0], dz[1], …: for those that integrate them with the plant."""
+        if remembers:
+            targets = [f"dz[{k}]" for k in range(len(system.memory))]
+            self.rates = self._printer.body("rates", self._load(seeing), targets)
 
     def _load(self, owners: dict[str, str], *, x_is_array: bool = False) -> Callable[[str, int], str]:
         """C of the inputs: members of the structures they come in."""
@@ -129,14 +161,17 @@ class TypedInterface:
             return _padded(real * (len(members) - integers) + 4 * integers, real)
         config = real if "parameters" in self.structures else 4  # the fallback, padded before numbers
         config += real * len(self.structures.get("parameters", ()))
-        return _padded(_padded(config, real) + real * self.derived + self.bytes_of("command") + 4, real)
+        return _padded(_padded(config, real) + real * self.derived + self._past + 4, real)
+
+    @property
+    def _past(self) -> int:
+        """Bytes of what springline_controller keeps from step to step."""
+        return self.bytes_of("command") + (self.bytes_of("memory") if "memory" in self.structures else 0)
 
     def stack(self, name: str) -> int:
         """Estimated bytes of stack of springline_step ("control") or springline_plant_step ("plant")."""
         real = 8 if self.export.real == "double" else 4
-        local = (
-            self.bytes_of("command") + self.bytes_of("diagnostics") if name == "control" else 4 * self.bytes_of("state")
-        )
+        local = self._past + self.bytes_of("diagnostics") if name == "control" else 4 * self.bytes_of("state")
         return _padded(real * self.bodies[name].live + local + _MATH_STACK, 16)
 
     # -- blocks of the templates --------------------------------------------------------------------------------
@@ -155,11 +190,13 @@ class TypedInterface:
             " + ".join(f"diagnostics->{part.name}_{j.name}" for part in system.command_parts) for j in system.joints
         ]
         values = [f"diagnostics->{field.name}" for field in diagnostics if not field.integer]
+        ahead = [f"ahead->{field.name}" for field in self.structures.get("memory", ())]
         flags = [
             f"  diagnostics->saturated_{j.name} = command->U_{j.name} < {total} || command->U_{j.name} > {total};"
             for j, total in zip(system.joints, sums, strict=True)
         ]
-        for j, wished in zip(system.joints, self.bodies["control"].values[-system.n :], strict=True):
+        wished_rates = self.bodies["control"].values[-system.n :] if system.controller.law else ()
+        for j, wished in zip(system.joints, wished_rates, strict=False):
             limit = self._parameter(f"control.a_max.{system.joints.index(j)}")
             flags.append(f"  diagnostics->a_limited_{j.name} = {wished} < -{limit} || {wished} > {limit};")
         state = self.structures["state"]
@@ -169,7 +206,7 @@ class TypedInterface:
             "zero_command": self._zeros("command"),
             "zero_diagnostics": self._zeros("diagnostics"),
             "zero_base": self._zeros("base"),
-            "control_is_finite": _all(f"springline_is_finite({value})" for value in (*values, *sums)),
+            "control_is_finite": _all(f"springline_is_finite({value})" for value in (*values, *sums, *ahead)),
             "control": "\n".join(["  (void)controller;", *self._lines("control"), *flags]),
             "plant": "\n".join(["  (void)controller, (void)base;", *self._lines("plant")]),
             "measure": "\n".join(self._lines("measure")),
@@ -180,6 +217,8 @@ class TypedInterface:
             "next_to_state": "\n".join(f"  state->{field.name} = next[{k}];" for k, field in enumerate(state)),
             "states": str(len(state)),
             **self._stepping(),
+            **self._remembering(),
+            "diagnostics_meaning": self._diagnostics_meaning(),
             "control_operations": str(self.bodies["control"].operations),
             "plant_operations": str(self.bodies["plant"].operations),
             "signals_meaning": self._signals_meaning(),
@@ -233,6 +272,57 @@ class TypedInterface:
             "base_node_values": "{" + nodes + "}",
             "integrator": f"{tableau.title}, order {tableau.order}",
         }
+
+    def _remembering(self) -> dict[str, str]:
+        """What there is of the controller's states in springline.h and springline.c: nothing where it has none."""
+        system, period = self.export.system, f"{self.export.period:g} s"
+        outcome = (
+            "Whatever happens *command is set: to the fallback if the status is not SPRINGLINE_OK. diagnostics may be "
+            "NULL; it is zero if the status is not SPRINGLINE_OK."
+        )
+        late = "too slowly, or with its command too late, it leaves its reference or diverges (README.md says more)."
+        forgets = "Forgets the past of a controller, not its configuration: the last command is zero"
+        if not system.memory:
+            keeps = f"The law keeps no state from step to step, but the arm does: sampled {late}"
+            return {
+                **dict.fromkeys(_OF_MEMORY, ""),
+                "step_meaning": _wrapped(f"Computes the command for one sample. {keeps} {outcome}"),
+                "kept": "The last command is kept.",
+                "forgetting": _wrapped(f"{forgets}, as after springline_init."),
+            }
+        start = ", ".join(constant_expression(value, self.export.real) for value in system.z_start)
+        texts = (
+            "/* The controller's states: what it remembers from sample to sample. */\n"
+            f"typedef struct springline_memory {{\n{self._fields('memory')}\n}} springline_memory;\n\n",
+            "  springline_memory z;\n",
+            f"static const springline_memory springline_initial_memory = {{{start}}};\n",
+            "  controller->z = springline_initial_memory;\n",
+            ", springline_memory *ahead",
+            ", const springline_memory *ahead",
+            "  springline_memory ahead = springline_initial_memory;\n",
+            ", &ahead",
+            "    controller->z = ahead;\n",
+        )
+        moves = (
+            f"Computes the command for one sample and moves the controller's states on by {period}: call it at this "
+            f"period, the exported scenario's. The arm goes on in between: sampled {late}"
+        )
+        return {
+            **dict(zip(_OF_MEMORY, texts, strict=True)),
+            "step_meaning": _wrapped(f"{moves} {outcome} In that case the states stay as they were."),
+            "kept": "The last command and the controller's states are kept.",
+            "forgetting": _wrapped(f"{forgets} and the states are the initial ones, as after springline_init."),
+        }
+
+    def _diagnostics_meaning(self) -> str:
+        system = self.export.system
+        parts = len(system.command_parts)
+        shown = ["tracking error e", *(["sliding variable sigma"] if system.sliding else [])]
+        shown.append("the two parts of U" if parts == 2 else "the parts of U" if parts > 1 else "U before its limit")
+        limits = "saturated where U_max has limited U"
+        if system.controller.law:
+            limits += ", a_limited where a_max has limited the acceleration that the reaching law wished"
+        return _wrapped(f"Why: {', '.join(shown)}, and whether a limit was met (0 or 1): {limits}.")
 
     def _table_data(self, name: str, time: str) -> list[str]:
         """Statements that look up what body `name` reads of the tables."""
@@ -313,6 +403,11 @@ def bounds_tests(expression: str, bounds: Bounds, real: Real) -> list[str]:
         half = f"{literal(0.5, real)} * {expression}"
         tests.append(f"{'slf' if real == 'float' else 'sl'}_floor({half}) >= {half}")
     return tests
+
+
+def _wrapped(text: str) -> str:
+    """The text of a C comment, on lines that are no longer than others."""
+    return "\n * ".join(textwrap.wrap(text, _LINE - 5))
 
 
 def _all(tests: Iterable[str]) -> str:

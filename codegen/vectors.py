@@ -23,7 +23,7 @@ from springline.codegen.export import Export, provenance
 from springline.codegen.stepping import updates
 from springline.codegen.typed import TypedInterface
 from springline.model.integrators import Tableau
-from springline.model.quantities import A_LIMITED, SATURATED, SIGMA, E, U, entries
+from springline.model.quantities import A_LIMITED, SATURATED, E, U, entries
 
 CONTROL_VECTORS = 1000
 PLANT_VECTORS = 200
@@ -78,7 +78,7 @@ def test_vectors(export: Export, interface: TypedInterface, sources: Mapping[str
     names = {name: " ".join(field.name for field in fields) for name, fields in interface.structures.items()}
     lines = [
         *provenance(export),
-        f"control: {names['reference']} {names['measurement']}",
+        f"control: {names['reference']} {names['measurement']}" + (f" {names['memory']}" if "memory" in names else ""),
         f"      -> {' '.join(control_outputs(export))}",
         f"plant (a step of {TIME_STEP!r} s, base motion constant): {names['base']} {names['state']} {names['command']}",
         f"      -> {names['state']}",
@@ -91,9 +91,14 @@ def test_vectors(export: Export, interface: TypedInterface, sources: Mapping[str
 
 
 def control_outputs(export: Export) -> list[str]:
-    """What a control vector's outputs are called, in order: those of the model's control, then the flags of limits."""
-    quantities = (U, *export.system.command_parts, E, SIGMA, SATURATED, A_LIMITED)
-    return [entry.name for entry in entries(quantities, export.system.joints)]
+    """What a control vector's outputs are called, in order.
+
+    Those of the model's control, then the flags of limits, and last the controller's states after the sample.
+    """
+    system = export.system
+    limits = (SATURATED, A_LIMITED) if system.controller.law else (SATURATED,)
+    quantities = (U, *system.command_parts, E, *system.sliding, *limits, *system.controller_states)
+    return [entry.name for entry in entries(quantities, system.joints)]
 
 
 def _finite(export: Export, outputs: Sequence[str], rows: Iterable[list[float]]) -> Iterator[list[float]]:
@@ -137,6 +142,7 @@ class _Draw:
 def _control_rows(interface: TypedInterface, model: _Model) -> Iterator[list[float]]:
     system = interface.export.system
     n, draw = system.n, _Draw()
+    z = np.array(system.z_start, model.dtype)  # the vectors are a sequence: what a sample leaves, the next one takes
     names = {field.name for field in interface.structures["measurement"]}
     measured = [k for k, field in enumerate(interface.structures["state"]) if field.name in names]
     for _ in range(CONTROL_VECTORS):
@@ -147,21 +153,26 @@ def _control_rows(interface: TypedInterface, model: _Model) -> Iterator[list[flo
         dq2 = [a + b for a, b in zip(dq1, draw.small(0, n), strict=True)]
         reference = np.array([*q1d, *dq1d, *ddq1d], model.dtype)
         x = np.array([*q1, *dq1, *q1, *dq2][: system.x.numel()], model.dtype)
-        outputs = model("control", *np.split(reference, 3), x)
+        seen, before = [*np.split(reference, 3), x, *([z] if len(z) else [])], z
+        outputs = model("control", *seen)
         flags = _limits_met(interface.export, model, outputs)
-        yield [*reference, *x[measured], *(value for part in outputs for value in part), *flags]
+        if len(z):
+            [z] = model("update", *seen, np.array([interface.export.period], model.dtype))
+        yield [*reference, *x[measured], *before, *(value for part in outputs for value in part), *flags, *z]
 
 
 def _limits_met(export: Export, model: _Model, outputs: Sequence[Numbers]) -> Iterator[float]:
-    """Per joint whether U_max has limited the command (0 or 1), then whether a_max has limited the reaching law.
+    """Per joint whether U_max has limited the command (0 or 1), then whether a_max has limited a reaching law.
 
     outputs  of the model's control: the command, the parts it is the sum of, error, sliding variable
     """
-    u, *parts, _, sigma = outputs
+    u, *parts = outputs[: 1 + len(export.system.command_parts)]
     yield from (u != reduce(operator.add, parts)).astype(float)
-    law = f"law_{export.system.structure.law}"
-    for i, value in enumerate(sigma):
-        [wished] = model(law, np.array([value], model.dtype))
+    law = export.system.controller.law
+    if law is None:
+        return
+    for i, value in enumerate(outputs[-1]):
+        [wished] = model(f"law_{law.name}", np.array([value], model.dtype))
         yield float(abs(wished[0]) > model.dtype(export.value(f"control.a_max.{i}")))
 
 

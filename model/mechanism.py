@@ -19,6 +19,11 @@ from springline.model.signals import SineTerm
 _FAST_DAMPING = 0.5
 
 
+def snake_case(name: str) -> str:
+    """A class's name as it is written in a file: "OneLink" is "one_link"."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
 class Mechanism(ABC):
     """An arm of n joints, n >= 1. A subclass says at least its joints, parameters, motors, springs and two energies.
 
@@ -52,7 +57,7 @@ class Mechanism(ABC):
 
     def __init_subclass__(cls) -> None:
         """Fill in what the class leaves open and depends on how many joints it has."""
-        cls.name = vars(cls).get("name", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower())
+        cls.name = vars(cls).get("name", snake_case(cls.__name__))
         joints = getattr(cls, "joints", ())
         for attribute in ("reference_offset", "start_position", "start_rate"):
             if not getattr(cls, attribute):

@@ -168,7 +168,7 @@ class ParameterVector:
         """Append every parameter of one TOML table and return its symbols by name."""
         symbols: dict[str, ca.SX] = {}
         for item in parameters:
-            stem = f"{table}_{item.name}"
+            stem = f"{table.replace('.', '_')}_{item.name}"
             defaults = item.defaults(joints)
             if item.per_joint:
                 entries = [

@@ -41,7 +41,7 @@ class Quantity:
     unit     SI; "{q}" and "{F}" stand for the coordinate's unit and its force's
     meaning  a phrase without a full stop
     per      what it has one entry of
-    initial  its value before the first sample, where it is a state of the controller
+    initial  its value at the beginning, where it is a state of the controller
     """
 
     name: str
@@ -106,6 +106,7 @@ U = Quantity("U", "U", "{F}", "command to the motor")
 E = Quantity("e", "e", "{q}", "tracking error")
 SIGMA = Quantity("sigma", r"\sigma", "{q}/s", "sliding variable")
 U_S = Quantity("U_s", "U_s", "{F}", "slow part of the command, before its limit")
+U_WISHED = Quantity("U_wished", r"U_w", "{F}", "command before its limit")
 U_F = Quantity("U_f", "U_f", "{F}", "fast part of the command, before its limit")
 SATURATED = Quantity("saturated", "U = U_{max}", "0 or 1", "whether U_max limits the command")
 A_LIMITED = Quantity("a_limited", "a = a_{max}", "0 or 1", "whether a_max limits the reaching law")

@@ -1,7 +1,7 @@
 """The whole system: mechanism, drive, signals and controller put together, as named CasADi Functions.
 
-    State x = [q1, dq1, q2, dq2] (4n x 1; without q2, dq2 where the drive is rigid). Argument order everywhere: what
-    depends on time, x, u, p.
+    State x = [q1, dq1, q2, dq2] (4n x 1; without q2, dq2 where the drive is rigid), controller state z (none for the
+    paper's controller). Argument order everywhere: what depends on time, x, z, u, p.
 
 Plant and controller have parameters of their own: "plant.*" is the arm that moves, "mechanism.*" and "drive.*" are what
 the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db, ddb] alone.
@@ -9,7 +9,7 @@ the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db,
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -17,7 +17,8 @@ import casadi as ca
 
 from springline.model import perturbation, signals
 from springline.model.base import COORDINATES, BaseMotion
-from springline.model.control import K_F, U_MAX, ControlSignals, control, fast_control
+from springline.model.control import CONTROLLERS, K_F, U_MAX, fast_control
+from springline.model.controller import ArmModel, Controller, ControlSignals, commanded
 from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
 from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
@@ -25,7 +26,7 @@ from springline.model.lagrange import EquationsOfMotion, equations_of_motion
 from springline.model.linear import as_written
 from springline.model.mechanism import Mechanism
 from springline.model.mechanisms import MECHANISMS
-from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot
+from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
 from springline.model.quantities import (
     BASE,
     DQ1,
@@ -35,7 +36,6 @@ from springline.model.quantities import (
     Q1D,
     REFERENCE,
     SIGMA,
-    U_F,
     U_S,
     B,
     E,
@@ -68,6 +68,7 @@ class SignalShape:
 class Structure:
     """Everything about a system that is no number: a new structure is a new kernel, a new number is not.
 
+    controller     by name; law, log_form and exponents are those of one that has a reaching law
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
     effects        properties of sensors and motors, by name, in the order in which they act
     initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
@@ -85,6 +86,7 @@ class Structure:
     start: JointStart = "given"
     integrator: str = "rk4"
     effects: tuple[str, ...] = ()
+    controller: str = "terminal_sliding"
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +125,9 @@ class System:
         self.structure = structure or Structure()
         self.mechanism: Mechanism = MECHANISMS[self.structure.mechanism]
         self.drive: Drive = DRIVES[self.structure.drive]
+        self.controller: Controller = CONTROLLERS[self.structure.controller].with_law(
+            LAWS[self.structure.law], self.structure.log_form, self.structure.exponents
+        )
         self.tableau: Tableau = INTEGRATORS[self.structure.integrator]
         self.joints: tuple[Joint, ...] = self.mechanism.joints
         self.n = n = len(self.joints)
@@ -135,6 +140,8 @@ class System:
         self._plant = vector.table("plant", (*arm, *drive), self.joints)
         control_table = control_parameters(self.mechanism, self.structure.drive)
         self._control = vector.table("control", control_table, self.joints)
+        own = tuple(self.mechanism.fitted(item) for item in self.controller.parameters)
+        self._control |= vector.table(f"control.{self.controller.name}", own, self.joints)
 
         self.t = ca.SX.sym("t")
         self._d: list[ca.SX] = []
@@ -156,6 +163,8 @@ class System:
         self.q1, self.dq1 = self._state[Q1], self._state[DQ1]
         self.x = ca.vertcat(*self._state.values())
         self.u = ca.SX.sym("u", n)
+        self.z = ca.SX.sym("z", len(self.memory))
+        self.h = ca.SX.sym("h")
 
     # Parameters of signals and start
 
@@ -287,12 +296,32 @@ class System:
     @property
     def command_parts(self) -> tuple[Quantity, ...]:
         """What the command is the sum of, before its limit."""
-        return (U_S, U_F) if self.structure.drive == "elastic" else (U_S,)
+        return tuple(self._commanded.parts)
+
+    @property
+    def sliding(self) -> tuple[Quantity, ...]:
+        """The sliding variable, where the controller has one."""
+        return tuple(item for item in self.controller.diagnostics if item == SIGMA)
+
+    @property
+    def controller_states(self) -> tuple[Quantity, ...]:
+        """What z consists of, by the names of its columns."""
+        return tuple(replace(state, name=f"z_{state.name}") for state in self.controller.states)
+
+    @property
+    def memory(self) -> tuple[Entry, ...]:
+        """The entries of z."""
+        return entries(self.controller_states, self.joints)
+
+    @property
+    def z_start(self) -> tuple[float, ...]:
+        """What z is at the beginning."""
+        return tuple(float(state.initial) for state in self.controller_states for _ in state.entries(self.joints))
 
     @property
     def columns(self) -> tuple[Quantity, ...]:
         """What a trajectory shows, in the order of the loop's rows."""
-        return (T, *self.drive.state, Q1D, E, SIGMA, U, B)
+        return (T, *self.drive.state, Q1D, E, *self.sliding, U, *self.controller_states, B)
 
     @property
     def trajectory(self) -> tuple[Entry, ...]:
@@ -308,23 +337,28 @@ class System:
     def functions(self) -> dict[str, ca.Function]:
         """All Functions, parameters symbolic. Those of the paper's equations first, then the loop's."""
         real = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
-        nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal)
-        commanded = control(
-            (self.q1d, self.dq1d, self.ddq1d),
-            self._state,
-            nominal,
-            diagonal(self.mechanism.motor_inertia, self._nominal),
-            self._control,
-            LAWS[self.structure.law],
-            self.structure.log_form,
-            self.structure.exponents,
-        )
+        signals = self._commanded
         applied = actuated(self.structure.effects, self.u)
         dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant)
         return {
-            **self._equations(real, commanded, dx),
-            **self._loop(real, commanded, dx),
+            **self._equations(real, signals, dx),
+            **self._loop(real, signals, dx),
         }
+
+    @cached_property
+    def _commanded(self) -> ControlSignals:
+        """What the controller computes of q1, dq1 and the rest of the state as they are."""
+        nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal)
+        return commanded(
+            self.controller,
+            self.joints,
+            Values({"q": self.q1d, "dq": self.dq1d, "ddq": self.ddq1d}),
+            Values({item.name: symbol for item, symbol in self._state.items()}),
+            self.z,
+            ArmModel(nominal, self.q1, self.dq1, diagonal(self.mechanism.motor_inertia, self._nominal)),
+            self._control,
+            self.h,
+        )
 
     def _function(
         self, name: str, inputs: list[ca.SX], outputs: list[ca.SX], names_in: list[str], names_out: list[str]
@@ -333,7 +367,7 @@ class System:
             flat = ca.cse([ca.densify(o) for o in outputs])
             return {name: ca.Function(name, [*inputs, self.p], flat, [*names_in, "p"], names_out)}
 
-    def _equations(self, real: EquationsOfMotion, commanded: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
+    def _equations(self, real: EquationsOfMotion, seen: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
         """The equations of docs/paper.md, as they are offered to others."""
         q1, dq1, x, base, function = self.q1, self.dq1, self.x, self.base, self._function
         m2 = diagonal(self.mechanism.motor_inertia, self._plant)
@@ -344,7 +378,9 @@ class System:
         base_in, base_names = [base.b, base.db, base.ddb], ["b", "db", "ddb"]
         slow_args, slow_names = [*base_in, q1, dq1, u_slow], [*base_names, "q1", "dq1", "u_s"]
         slow = perturbation.slow_dynamics(u_slow, real.disturbance, real, m2)
-        parts, part_names = list(commanded.parts.values()), [item.name.lower() for item in commanded.parts]
+        z_in, z_names = ([self.z], ["z"]) if self.controller.states else ([], [])
+        parts, part_names = list(seen.parts.values()), [item.name.lower() for item in seen.parts]
+        sigma_out, sigma_names = ([seen.sigma], ["sigma"]) if self.sliding else ([], [])
         result = {
             **function("mass_matrix", [q1], [real.mass], ["q1"], ["M1"]),
             **function("coriolis", [q1, dq1], [real.coriolis], ["q1", "dq1"], ["C_dq1"]),
@@ -365,20 +401,26 @@ class System:
                     "fast_control", [dq1, dq2], [fast_control(dq1, dq2, self._control.K_f)], ["dq1", "dq2"], ["u_f"]
                 ),
             }
-        slow_outputs = [commanded.parts[U_S], commanded.error, commanded.sigma]
-        result |= {
-            **function("slow_control", [*ref_in, x], slow_outputs, [*ref_names, "x"], ["u_s", "e", "sigma"]),
-            **function(
-                "control",
-                [*ref_in, x],
-                [commanded.command, *parts, commanded.error, commanded.sigma],
-                [*ref_names, "x"],
-                ["u", *part_names, "e", "sigma"],
-            ),
-        }
-        for law in LAWS.values():
-            rate = law.rate(sigma, self._control, self.structure.log_form)
-            result |= function(f"law_{law.name}", [sigma], [rate], ["sigma"], ["dsigma"])
+        ins, names = [*ref_in, x, *z_in], [*ref_names, "x", *z_names]
+        if U_S in seen.parts:
+            slow_outputs = [seen.parts[U_S], seen.error, *sigma_out]
+            result |= function("slow_control", ins, slow_outputs, names, ["u_s", "e", *sigma_names])
+        result |= function(
+            "control",
+            ins,
+            [seen.command, *parts, seen.error, *sigma_out],
+            names,
+            ["u", *part_names, "e", *sigma_names],
+        )
+        if self.controller.states:
+            result |= {
+                **function("rates", ins, [seen.dz], names, ["dz"]),
+                **function("update", [*ins, self.h], [seen.ahead], [*names, "h"], ["z_next"]),
+            }
+        if self.controller.law:
+            for law in LAWS.values():
+                rate = law.rate(sigma, self._control, self.structure.log_form)
+                result |= function(f"law_{law.name}", [sigma], [rate], ["sigma"], ["dsigma"])
         energy = self._arm_energy() + self.drive.energy(x, self.mechanism, self._plant)
         return {
             **result,
@@ -389,17 +431,27 @@ class System:
     def _loop(self, real: EquationsOfMotion, commanded: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
         """What the simulation loop consists of."""
         w, x, function = self.w, self.x, self._function
+        z_in, z_names = ([self.z], ["z"]) if self.controller.states else ([], [])
+        ins, names = [w, x, *z_in], ["w", "x", *z_names]
         y = ca.vertcat(*sensed(self.structure.effects, self._state).values())
         seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished]
-        seen = ca.substitute(seen, [x], [y]) if self.structure.effects else seen
-        return {
+        later = [commanded.dz, commanded.ahead]
+        if self.structure.effects:
+            seen, later = (ca.substitute(values, [x], [y]) for values in (seen, later))
+        result = {
             **function("measure", [x], [y], ["x"], ["y"]),
             **function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
             **function("start", [self.t, self.d], [self._start(real)], ["t", "d"], ["x"]),
-            **function("loop_control", [w, x], seen, ["w", "x"], ["u", "e", "sigma", "wished"]),
-            **function("loop_error", [w, x], seen[1:3], ["w", "x"], ["e", "sigma"]),
+            **function("loop_control", ins, seen, names, ["u", "e", "sigma", "wished"]),
+            **function("loop_error", ins, seen[1:3], names, ["e", "sigma"]),
             **function("loop_plant", [w, x, self.u], [dx], ["w", "x", "u"], ["dx"]),
         }
+        if self.controller.states:
+            result |= {
+                **function("loop_rates", ins, later[:1], names, ["dz"]),
+                **function("loop_update", [*ins, self.h], later[1:], [*names, "h"], ["z_next"]),
+            }
+        return result
 
     def _arm_energy(self) -> ca.SX:
         """Kinetic and potential energy of the arm with the base at rest, J."""

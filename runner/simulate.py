@@ -24,6 +24,7 @@ from springline.codegen.kernel import (
 )
 from springline.codegen.memory import memory
 from springline.model.parameters import Joint
+from springline.model.quantities import entries
 from springline.model.system import System
 from springline.runner.crew import Crew, results
 from springline.runner.errors import InputError, Problem
@@ -103,7 +104,8 @@ def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tup
     place = int(runs.quantity[run])
     quantity = quantity_name(system, place)
     left = "the finite numbers" if status == "diverged" else f"its bound (|{quantity}| <= {settings.bound:g})"
-    if place < system.x.numel():
+    states = (*entries(system.drive.state, system.joints), *system.memory)
+    if quantity in {entry.name for entry in states}:
         when = f"at t = {end + settings.step:g} s; results end at t = {end:g} s"
     else:  # the state that it was computed from is still there
         when = f"at t = {end:g} s, where results end"

@@ -3,13 +3,16 @@
  *
  * A pack is SL_G groups of SL_W lanes, a lane is one run; SL_PACKS packs go through time side by side. "kernel.h" comes
  * from a generator and provides
- *   sizes        SL_W SL_G SL_PACKS; SL_NJ joints, SL_NX states, SL_NB base coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV
+ *   sizes        SL_W SL_G SL_PACKS; SL_NJ joints, SL_NX states, the last SL_NZ of them the controller's, SL_NB base coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV
  *                (values bound once per run; once per time and the same for all runs; once per time and run),
- *                SL_ND, SL_NTABLES; SL_SAMPLED 0 or 1
+ *                SL_ND, SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller has a sliding variable) 0 or 1
  *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
  *                needed for long), sl_node, sl_when, sl_kept, kernel_update
+ * The controller's states go on with the plant's where control is continuous. Where it is sampled they are held, and at a
+ * sample kernel_control gives what they are after the step that begins there: a row at a sample shows those that its
+ * command was computed from.
  * Times are t = start + (k + c) h for step k and node c, never accumulated.
  */
 #include <fenv.h>
@@ -25,7 +28,9 @@ enum {
   SL_PACK = SL_W * SL_G,
   SL_NMETRICS = SL_NJ * SL_METRICS_PER_JOINT,
   SL_BLOCK = (SL_INSTANTS + SL_W - 1) / SL_W * SL_W, /* instants whose uniform signals are evaluated together */
-  SL_NCOLUMNS = 1 + SL_NX + 4 * SL_NJ + SL_NB
+  SL_NPLANT = SL_NX - SL_NZ,
+  SL_NSIGMA = SL_NJ * SL_SLIDING,
+  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB
 };
 
 /* ---- signals ------------------------------------------------------------------------------------------- */
@@ -112,11 +117,12 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
     if (!pack->alive[lane] || job->rows[run] >= job->capacity) continue;
     row = job->trajectory + (run * job->capacity + job->rows[run]++) * SL_NCOLUMNS;
     *row++ = step_time(job, k);
-    for (i = 0; i < SL_NX; i++) *row++ = lane_of(pack->x[i], lane);
+    for (i = 0; i < SL_NPLANT; i++) *row++ = lane_of(pack->x[i], lane);
     for (i = 0; i < SL_NJ; i++) *row++ = lane_of(q1d[i], lane);
     for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->e[i], lane);
-    for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->sigma[i], lane);
+    for (i = 0; i < SL_NSIGMA; i++) *row++ = lane_of(pack->sigma[i], lane);
     for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->u[i], lane);
+    for (i = SL_NPLANT; i < SL_NX; i++) *row++ = lane_of(pack->x[i], lane);
     for (i = 0; i < SL_NB; i++) *row++ = lane_of(b[i], lane);
   }
 }
@@ -131,6 +137,7 @@ static void finish_lane(sl_pack *pack, int lane, int64_t k, enum sl_status statu
   for (i = 0; i < SL_NJ; i++) {
     sl_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, job->start_time, end, job->step, half,
                       status == SL_OK, job->metrics + run * SL_NMETRICS + i * SL_METRICS_PER_JOINT);
+    if (!SL_SLIDING) job->metrics[run * SL_NMETRICS + i * SL_METRICS_PER_JOINT + SL_SIGMA_TV] = SL_NAN;
   }
   job->end_time[run] = end;
   job->status[run] = (int32_t)status;
@@ -152,7 +159,8 @@ static void stop_runaways(sl_pack *pack, int64_t k, double bound) {
     if (pack->alive[lane]) {
       const double value = sl_fabs(lane_of(pack->next[bad], lane));
       if (between_rows) write_row(pack, k, pack->times[0], lane, lane + 1);
-      finish_lane(pack, lane, k, value <= DBL_MAX ? SL_OUT_OF_BOUNDS : SL_DIVERGED, bad);
+      finish_lane(pack, lane, k, value <= DBL_MAX ? SL_OUT_OF_BOUNDS : SL_DIVERGED,
+                  bad < SL_NPLANT ? bad : bad + 3 * SL_NJ + SL_NSIGMA);
     }
     for (i = 0; i < SL_NX; i++) set_lane(pack->next[i], lane, 0.0);
   }
@@ -184,7 +192,7 @@ SL_RARE void stop_overflows(sl_pack *pack, int64_t k, sl_time now) {
       if (!sl_isfinite(wished)) set_lane(pack->u[i], lane, wished);
     }
     if (pack->job->output_every > 0) write_row(pack, k, now, lane, lane + 1);
-    finish_lane(pack, lane, k, SL_DIVERGED, SL_NX + SL_NJ + bad);
+    finish_lane(pack, lane, k, SL_DIVERGED, SL_NPLANT + SL_NJ + (bad < 2 * SL_NJ ? bad : bad - SL_NJ + SL_NSIGMA));
   }
 }
 
@@ -235,7 +243,12 @@ static void run_stage(sl_pack *pack, int64_t k, int stage) {
 static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
   const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
   if (k % pack->job->hold == 0) {
+#if SL_NZ > 0
+    const double period = (double)pack->job->hold * pack->job->step;
+    kernel_control(now, x, period, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->next + SL_NPLANT);
+#else
     kernel_control(now, x, p, r, pack->u, pack->e, pack->sigma, pack->wished);
+#endif
   } else {
     kernel_error(now, x, p, r, pack->e, pack->sigma);
   }

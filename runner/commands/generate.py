@@ -72,7 +72,10 @@ def _command(name: str, description: str, default: Any = ...) -> Callable[..., N
         loaded = load_scenario(scenario, overrides(changes, scenario))
         names = tunable_names(tunable)
         try:
-            export = bind(loaded.structure(), loaded.values(), tunable=names, prefix=prefix, real=real.value)
+            period = max(loaded.control_every, 1) * loaded.step
+            export = bind(
+                loaded.structure(), loaded.values(), tunable=names, prefix=prefix, real=real.value, period=period
+            )
             files, manifest = generate_files(export)
         except Overflow as error:
             raise InputError(Problem(scenario, error.key, str(error), repr(error.value))) from error

@@ -24,7 +24,7 @@ from springline.codegen.program import program
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS
 from springline.model.quantities import Q1, Quantity
-from springline.model.system import SignalShape, Structure
+from springline.model.system import SignalShape, Structure, System
 
 pytestmark = pytest.mark.usefixtures("other_arms")
 
@@ -39,6 +39,15 @@ class WeakMotor(Effect):
 
     def actuate(self, u: ca.SX) -> ca.SX:
         return 0.8 * u
+
+
+class LateBus(Effect):
+    """A bus between controller and motor that adds a bias: seen before what a motor makes of it."""
+
+    name = "late_bus"
+
+    def delay(self, u: ca.SX) -> ca.SX:
+        return u + 0.5
 
 
 class Offset(Effect):
@@ -57,7 +66,7 @@ def _fmus_that_are_compiled_quickly(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True)
 def _made_up_effects() -> Iterator[None]:
-    effects = (WeakMotor(), Offset())
+    effects = (WeakMotor(), LateBus(), Offset())
     EFFECTS.update({effect.name: effect for effect in effects})
     yield
     for effect in effects:
@@ -136,7 +145,7 @@ def of_state_and_command(structure: Structure, rows: np.ndarray) -> np.ndarray:
     return np.hstack([rows[:, 1 : 1 + states], rows[:, 1 + states + 3 * n : 1 + states + 4 * n]])
 
 
-@pytest.mark.parametrize("effect", ["weak_motor", "offset"])
+@pytest.mark.parametrize("effect", ["weak_motor", "late_bus", "offset"])
 def test_an_effect_reaches_batch_exported_c_and_fmu(effect: str, tmp_path: Path) -> None:
     structure, ideal = structure_of("one_link", effects=(effect,)), structure_of("one_link")
     for sampled in (True, False):
@@ -148,6 +157,16 @@ def test_an_effect_reaches_batch_exported_c_and_fmu(effect: str, tmp_path: Path)
     sampled_rows = rows_of(structure, True, every=100)
     expected = np.hstack([sampled_rows[:, 1:2], sampled_rows[:, 8:9]])  # q1 and U
     np.testing.assert_array_equal(exported_rows(structure, tmp_path)[: len(expected)], expected)
+
+
+def test_a_command_is_delayed_before_the_motors_act_on_it() -> None:
+    """Whatever the order in which a structure names the effects."""
+    for names in (("weak_motor", "late_bus"), ("late_bus", "weak_motor")):
+        system = System(structure_of("one_link", effects=names))
+        plant, values = system.function("loop_plant"), [slot.default for slot in system.slots]
+        w, x = np.zeros(system.w.numel()), np.zeros(system.x.numel())
+        ideal = System(structure_of("one_link")).function("loop_plant")
+        np.testing.assert_array_equal(plant(w, x, 2.0, values), ideal(w, x, 0.8 * (2.0 + 0.5), values))
 
 
 # Arms, drives and integrators by turns; dop853 for what keeps slopes and has many nodes.

@@ -7,7 +7,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from springline.model.control import control
+from springline.model.control import TerminalSliding
+from springline.model.controller import ArmModel
 from springline.model.drive import DRIVES
 from springline.model.lagrange import equations_of_motion
 from springline.model.parameters import Values
@@ -286,9 +287,10 @@ def largest_real_part():
     motors = Values({"m_l": ca.SX(2.0), "I": ca.SX(0.01), "k_s2": ca.SX(2e6), "k_s3": ca.SX(2e4)})
     link = equations_of_motion(system.mechanism, system.q1, system.dq1, system.base, arm)
     zero = ca.SX.zeros(2)
-    reference = (system.q1d, zero, zero)
-    y = dict(zip(system.drive.state, ca.vertsplit(system.x, 2), strict=True))
-    command = control(reference, y, link, inertia, p, Linear(slope), "power", SurfaceExponents()).command
+    r = Values({"q": system.q1d, "dq": zero, "ddq": zero})
+    y = Values(dict(zip(("q1", "dq1", "q2", "dq2"), ca.vertsplit(system.x, 2), strict=True)))
+    model = ArmModel(link, system.q1, system.dq1, inertia)
+    command = TerminalSliding(Linear(slope)).control(r, y, Values({}), model, p).u
     flow = DRIVES["elastic"].plant(system.x, command, link, system.mechanism, motors)
     base = ca.vertcat(system.base.b, system.base.db, system.base.ddb)
     arguments = [system.x, system.q1d, base, ca.vertcat(*arm.values()), delta, slope, gain]

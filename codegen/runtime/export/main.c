@@ -1,13 +1,13 @@
-/* The controller against its plant: samples of 1 ms, plant steps of 0.1 ms. Prints a trajectory as CSV.
+/* The controller against its plant: samples of {{period_text}}, plant steps of {{step_text}}. Prints a trajectory as CSV.
  * Usage: main [seconds = 1] */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "springline.h"
 
-enum { STEPS_PER_SAMPLE = 10, SAMPLES_PER_ROW = 10 };
+enum { STEPS_PER_SAMPLE = {{steps_per_sample}}, SAMPLES_PER_ROW = {{samples_per_row}} };
 
-static const springline_real STEP = 1e-4{{f}};
+static const springline_real STEP = {{step}}{{f}};
 
 /* Time of plant step j, or of a part of the way to the next; never accumulated. */
 static springline_real time_of(long j, springline_real part) { return ((springline_real)j + part) * STEP; }
@@ -20,7 +20,7 @@ static void print_row(springline_real t, const springline_reference *reference, 
 }
 
 int main(int argc, char **argv) {
-  const long samples = (argc > 1 ? strtol(argv[1], NULL, 10) : 1L) * 1000L;
+  const long samples = (argc > 1 ? strtol(argv[1], NULL, 10) : 1L) * {{samples_per_second}}L;
   springline_controller controller;
   springline_state state;
   springline_measurement measurement;

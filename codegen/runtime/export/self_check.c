@@ -16,7 +16,7 @@
 typedef {{bits_type}} bits;
 
 enum { CONTROL_IN = {{control_in}}, CONTROL_OUT = {{control_out}}, COMMAND_OUT = {{command_out}}, MODEL_OUT = {{model_out}},
-       PLANT_IN = {{plant_in}}, PLANT_OUT = {{plant_out}}, LINE = 4096 };
+{{memory_enum}}       PLANT_IN = {{plant_in}}, PLANT_OUT = {{plant_out}}, LINE = 4096 };
 
 static const char *const control_outputs[CONTROL_OUT] = { {{control_output_names}} };
 static const char *const plant_outputs[PLANT_OUT] = { {{plant_output_names}} };
@@ -56,7 +56,7 @@ static int replay_control(springline_controller *controller, long line, const sp
   springline_diagnostics diagnostics;
   springline_real got[CONTROL_OUT];
   int status;
-  read_control(in, &reference, &measurement);
+{{memory_check}}  read_control(in, &reference, &measurement);
   status = springline_step(controller, &reference, &measurement, &command, &diagnostics);
   if (status != SPRINGLINE_OK) {
     printf("line %ld: springline_step: %s\n", line, springline_status_text(status));
@@ -88,8 +88,8 @@ static int replay_fault(springline_controller *controller, long line, const spri
 static int replay_retuning(springline_controller *controller, long line, const springline_real *in,
                            const springline_real *expected) {
   springline_config config = springline_default_config;
-  if (replay_control(controller, line, in, expected)) return 1;
-  config.fallback = SPRINGLINE_FALLBACK_LAST;
+{{memory_local}}  if ({{again}}replay_control(controller, line, in, expected)) return 1;
+{{memory_seen}}  config.fallback = SPRINGLINE_FALLBACK_LAST;
   if (springline_set_parameters(controller, &config) != SPRINGLINE_OK) {
     printf("self_check: springline_set_parameters refused the default parameters\n");
     return 1;
@@ -99,7 +99,7 @@ static int replay_retuning(springline_controller *controller, long line, const s
     printf("self_check: springline_set_parameters took a fallback that there is not\n");
     return 1;
   }
-{{bad_parameter}}  if (replay_fault(controller, line, in, expected) || replay_control(controller, line, in, expected)) return 1;
+{{bad_parameter}}  if (replay_fault(controller, line, in, expected) || {{kept}}{{again}}replay_control(controller, line, in, expected)) return 1;
   if (springline_reset(controller) != SPRINGLINE_OK) {
     printf("self_check: springline_reset refused a controller that runs\n");
     return 1;

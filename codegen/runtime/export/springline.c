@@ -13,13 +13,13 @@ const springline_real springline_base_nodes[SPRINGLINE_BASE_NODES] = {{base_node
 static const springline_command springline_no_command = {{zero_command}};
 static const springline_diagnostics springline_no_diagnostics = {{zero_diagnostics}};
 static const springline_base springline_base_at_rest = {{zero_base}};
-
+{{initial_memory}}
 /* ---- the model, printed from the frozen expressions ------------------------------------------------------- */
 
 {{derive}}/* {{control_operations}} operations */
 static void springline_evaluate_control(const springline_controller *controller, const springline_reference *reference,
                                         const springline_measurement *measurement, springline_command *command,
-                                        springline_diagnostics *diagnostics) {
+                                        springline_diagnostics *diagnostics{{ahead_parameter}}) {
 {{control}}
 }
 
@@ -51,7 +51,7 @@ static int springline_base_is_finite(const springline_base *base) {
 }
 
 /* Looks at what stands before the limits, for a limit turns NaN and infinity into a number. */
-static int springline_control_is_finite(const springline_diagnostics *diagnostics) {
+static int springline_control_is_finite(const springline_diagnostics *diagnostics{{ahead_checked}}) {
   return {{control_is_finite}};
 }
 
@@ -87,7 +87,7 @@ int springline_init(springline_controller *controller, const springline_config *
   if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
   controller->ready = 0; /* what was there before may be anything, so a refusal leaves nothing of it */
   controller->last = springline_no_command;
-  status = springline_judge(config);
+{{forget}}  status = springline_judge(config);
   if (status != SPRINGLINE_OK) return status;
   springline_take(controller, config);
   controller->ready = SPRINGLINE_READY;
@@ -107,7 +107,7 @@ int springline_reset(springline_controller *controller) {
   if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
   controller->last = springline_no_command;
-  return SPRINGLINE_OK;
+{{forget}}  return SPRINGLINE_OK;
 }
 
 int springline_step(springline_controller *controller, const springline_reference *reference,
@@ -115,7 +115,7 @@ int springline_step(springline_controller *controller, const springline_referenc
                     springline_diagnostics *diagnostics) {
   springline_command wished = springline_no_command;
   springline_diagnostics seen = springline_no_diagnostics;
-  int status = SPRINGLINE_OK;
+{{ahead_local}}  int status = SPRINGLINE_OK;
   if (controller == NULL || reference == NULL || measurement == NULL || command == NULL) {
     status = SPRINGLINE_NULL_ARGUMENT;
   } else if (!springline_is_ready(controller)) {
@@ -125,12 +125,12 @@ int springline_step(springline_controller *controller, const springline_referenc
   } else if (!springline_measurement_is_finite(measurement)) {
     status = SPRINGLINE_BAD_MEASUREMENT;
   } else {
-    springline_evaluate_control(controller, reference, measurement, &wished, &seen);
-    if (!springline_control_is_finite(&seen)) status = SPRINGLINE_OVERFLOW;
+    springline_evaluate_control(controller, reference, measurement, &wished, &seen{{ahead_argument}});
+    if (!springline_control_is_finite(&seen{{ahead_argument}})) status = SPRINGLINE_OVERFLOW;
   }
   if (status == SPRINGLINE_OK) {
     controller->last = wished;
-  } else {
+{{keep_ahead}}  } else {
     const int ready = controller != NULL && springline_is_ready(controller);
     wished = ready && controller->config.fallback == SPRINGLINE_FALLBACK_LAST ? controller->last : springline_no_command;
     seen = springline_no_diagnostics;

@@ -35,8 +35,7 @@ typedef struct springline_command {
 {{command_fields}}
 } springline_command;
 
-/* Why: tracking error e, sliding variable sigma, the two parts of U, and whether a limit was met (0 or 1): saturated
- * where U_max has limited U, a_limited where a_max has limited the acceleration that the reaching law wished. */
+/* {{diagnostics_meaning}} */
 typedef struct springline_diagnostics {
 {{diagnostics_fields}}
 } springline_diagnostics;
@@ -58,10 +57,10 @@ typedef struct springline_base {
 /* {{default_config_meaning}} */
 extern const springline_config springline_default_config;
 
-/* A controller and all it needs. The caller owns it; only the functions below touch its fields. {{controller_bytes}} bytes. */
+{{memory_struct}}/* A controller and all it needs. The caller owns it; only the functions below touch its fields. {{controller_bytes}} bytes. */
 typedef struct springline_controller {
   springline_config config;
-{{controller_derived}}  springline_command last;
+{{controller_derived}}{{controller_memory}}  springline_command last;
   int32_t ready;
 } springline_controller;
 
@@ -73,18 +72,15 @@ int springline_init(springline_controller *controller, const springline_config *
 
 /*
  * Retunes a running controller between two steps: all of *config is checked, then taken. {{what_may_change}}
- * The last command is kept. If it fails nothing has changed, and the controller goes on as it was.
+ * {{kept}} If it fails nothing has changed, and the controller goes on as it was.
  */
 int springline_set_parameters(springline_controller *controller, const springline_config *config);
 
-/* Forgets the past of a controller, not its configuration: the last command is zero, as after springline_init. */
+/* {{forgetting}} */
 int springline_reset(springline_controller *controller);
 
 /*
- * Computes the command for one sample. The law keeps no state from step to step, but the arm does: sampled too slowly,
- * or with its command too late, it leaves its reference or diverges (README.md says more). Whatever happens *command is set:
- * to the fallback if the status is not SPRINGLINE_OK. diagnostics may be NULL; it is zero if the status is not
- * SPRINGLINE_OK.
+ * {{step_meaning}}
  */
 int springline_step(springline_controller *controller, const springline_reference *reference,
                     const springline_measurement *measurement, springline_command *command,

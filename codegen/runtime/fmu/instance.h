@@ -171,7 +171,7 @@ static int fmu_known(const fmu_instance *fmu, const char *function, unsigned ref
 
 static int fmu_get(fmu_instance *fmu, const char *function, unsigned reference, int boolean, double *value) {
   if (!fmu_known(fmu, function, reference, boolean)) return FMU_ERROR;
-  if (fmu_variables[reference].causality == FMU_OUTPUT && fmu_refresh(fmu, function) != FMU_OK) return FMU_ERROR;
+  if (fmu_variables[reference].causality >= FMU_OUTPUT && fmu_refresh(fmu, function) != FMU_OK) return FMU_ERROR;
   *value = fmu->core.now.values[reference];
   return FMU_OK;
 }

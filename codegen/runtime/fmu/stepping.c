@@ -8,13 +8,16 @@ static int fmu_begin(fmu_core *fmu) {
   springline_state state;
   const int status = springline_start(&fmu->controller, &state);
   if (status == SPRINGLINE_OK) fmu_put_state(fmu->now.values + FMU_AT_STATE, &state);
+#if FMU_MEMORY > 0
+  fmu_put_memory(fmu->now.values + FMU_AT_MEMORY, &springline_initial_memory);
+#endif
   return status;
 }
 
 /* One step of the integrator, or a part of one. */
 static int fmu_go(fmu_core *fmu, const fmu_place *to) {
   const fmu_state *now = &fmu->now;
-  double *x = fmu->now.values + FMU_AT_STATE, next[FMU_STATES];
+  double *x = fmu->now.values + FMU_AT_STATE, next[FMU_STATES + FMU_MEMORY]; /* the controller's behind the plant's */
   const int whole = !now->between && !to->between;
   fmu_interval interval;
   int status, i;
@@ -27,7 +30,7 @@ static int fmu_go(fmu_core *fmu, const fmu_place *to) {
   memcpy(next, x, sizeof next);
   status = fmu_move(fmu, &interval, next);
   if (status != SPRINGLINE_OK) return status;
-  for (i = 0; i < FMU_STATES; i++) {
+  for (i = 0; i < FMU_STATES + FMU_MEMORY; i++) {
     if (!(sl_fabs(next[i]) <= FMU_BOUND)) return SPRINGLINE_DIVERGED;
   }
   memcpy(x, next, sizeof next);
