@@ -56,7 +56,8 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
     w, s = f"{flat}now.varying", f"{flat}now.varying + SL_NUMBER_W"
     x, p, r = f"{flat}x", f"{flat}p", f"{flat}r"
     state = "sl_time now, const sl_group *x, const sl_group *p, const sl_group *r"
-    computed = "sl_group *u, sl_group *e, sl_group *sigma, sl_group *wished"
+    computed = "sl_group *u, sl_group *e, sl_group *sigma, sl_group *wished, sl_group *a_law"
+    results = [f"(double *){name}" for name in ("u", "e", "sigma", "wished", "a_law")]
     text = f"""{preamble}
 enum {{ SL_NUMBER_W = {program.size("w")} }};
 
@@ -92,7 +93,7 @@ static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
 }}
 
 static inline void kernel_control({state}, {computed}) {{
-{call("control", w, s, x, p, r, results=["(double *)u", "(double *)e", "(double *)sigma", "(double *)wished"])}
+{call("control", w, s, x, p, r, results=results)}
 }}
 
 static inline void kernel_plant(sl_time now, const sl_group *x, const sl_group *u, const sl_group *p, const sl_group *r,
@@ -101,7 +102,7 @@ static inline void kernel_plant(sl_time now, const sl_group *x, const sl_group *
 }}
 
 static inline void kernel_closed({state}, sl_group *dx, {computed}) {{
-  kernel_control(now, x, p, r, u, e, sigma, wished);
+  kernel_control(now, x, p, r, u, e, sigma, wished, a_law);
   kernel_plant(now, x, (const sl_group *)u, p, r, dx);
 }}
 """

@@ -24,6 +24,7 @@ class ControlSignals:
     command  what the motors are told, after the limit;  wished: before it
     parts    what `wished` is the sum of, by quantity
     error    tracking error;  sigma: sliding variable
+    a_law    what the reaching law asks for, before a_max
     """
 
     command: ca.SX
@@ -31,6 +32,7 @@ class ControlSignals:
     parts: dict[Quantity, ca.SX]
     error: ca.SX
     sigma: ca.SX
+    a_law: ca.SX
 
 
 def slow_control(ddq_d: ca.SX, u_e: ca.SX, nominal: EquationsOfMotion, motor_inertia: ca.SX) -> ca.SX:
@@ -62,11 +64,11 @@ def control(
     q_d, dq_d, ddq_d = reference
     error = q_d - y[Q1]
     sigma, surface_rate = surface(error, dq_d - y[DQ1], p, exponents)
-    u_e = reaching_rate(law, sigma, p, log_form) - surface_rate
-    parts = {U_S: slow_control(ddq_d, u_e, nominal, motor_inertia)}
+    rate, a_law = reaching_rate(law, sigma, p, log_form)
+    parts = {U_S: slow_control(ddq_d, rate - surface_rate, nominal, motor_inertia)}
     wished = parts[U_S]
     if DQ2 in y:
         parts[U_F] = fast_control(y[DQ1], y[DQ2], p.K_f)
         wished = wished + parts[U_F]
     command = ca.fmin(ca.fmax(wished, -p.U_max), p.U_max)
-    return ControlSignals(command, wished, parts, error, sigma)
+    return ControlSignals(command, wished, parts, error, sigma, a_law)

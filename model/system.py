@@ -27,6 +27,7 @@ from springline.model.mechanism import Mechanism
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot
 from springline.model.quantities import (
+    A_LAW,
     BASE,
     DQ1,
     DQ2,
@@ -300,6 +301,11 @@ class System:
         return entries(self.columns, self.joints)
 
     @property
+    def judged(self) -> tuple[Entry, ...]:
+        """What may end a run by leaving its bound, in the order in which the loop counts it: a row without t, a_law."""
+        return (*self.trajectory[1:], *entries((A_LAW,), self.joints))
+
+    @property
     def metrics(self) -> tuple[Entry, ...]:
         """Columns of a table of metrics: each for every joint."""
         return entries(METRICS, self.joints)
@@ -390,13 +396,13 @@ class System:
         """What the simulation loop consists of."""
         w, x, function = self.w, self.x, self._function
         y = ca.vertcat(*sensed(self.structure.effects, self._state).values())
-        seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished]
+        seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished, commanded.a_law]
         seen = ca.substitute(seen, [x], [y]) if self.structure.effects else seen
         return {
             **function("measure", [x], [y], ["x"], ["y"]),
             **function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
             **function("start", [self.t, self.d], [self._start(real)], ["t", "d"], ["x"]),
-            **function("loop_control", [w, x], seen, ["w", "x"], ["u", "e", "sigma", "wished"]),
+            **function("loop_control", [w, x], seen, ["w", "x"], ["u", "e", "sigma", "wished", "a_law"]),
             **function("loop_error", [w, x], seen[1:3], ["w", "x"], ["e", "sigma"]),
             **function("loop_plant", [w, x, self.u], [dx], ["w", "x", "u"], ["dx"]),
         }
