@@ -2,10 +2,12 @@
 
 The benchmark's arm with continuous and with sampled control, 32 runs at a time in the default build, and a run by
 itself. Each checkout prints and compiles its own kernels; all are called in this one process, in turn, so that whatever
-slows the machine down slows both. Times are of the processor, per step and run.
+slows the machine down slows both. Times are of the processor, per step and run, less what a call without a step takes:
+samples are short, for many short ones tell more than a few long ones.
 
 The exit code is 1 if a kernel of this checkout takes more than `--threshold` times as long as the other's, by the best
-samples and by the median of neighbouring ones too: noise seldom fools both.
+samples and by the median of neighbouring ones too: noise seldom fools both. Where libraries and stack come to lie in
+memory moves a ratio by 1 or 2 % from process to process, so call it several times before you believe 3 %.
 """
 
 from __future__ import annotations
@@ -24,10 +26,10 @@ from pathlib import Path
 
 from springline.benchmarks import problem
 
-
 WORK = ("continuous", "sampled", "continuous, one run", "sampled, one run")
 """Variants of springline's own contenders; every version has them."""
 
+_CALLS = 50
 _ROOT = "import pathlib, springline.codegen as c; print(pathlib.Path(c.__file__).parents[2])"
 
 
@@ -68,23 +70,26 @@ class Race:
     runs: tuple[problem.Runner, problem.Runner]
     batch: int
     steps: int = problem.QUANTUM
+    calls: list[float] = field(default_factory=lambda: [0.0, 0.0])
     samples: tuple[list[float], list[float]] = field(default_factory=lambda: ([], []))
 
-    def _spent(self, which: int) -> float:
+    def _spent(self, which: int, steps: int) -> float:
         delta = problem.deltas(self.batch)
         start = time.process_time()
-        self.runs[which](delta, self.steps)
+        self.runs[which](delta, steps)
         return time.process_time() - start
 
     def prepare(self, sample: float) -> None:
-        """Let a sample take about so many seconds."""
-        spent = min(self._spent(which) for which in (0, 1, 0, 1))
+        """Let a sample take about so many seconds, and see how long a call without a step takes."""
+        self.calls = [min(self._spent(which, 0) for _ in range(_CALLS)) for which in (0, 1)]
+        spent = min(self._spent(which, problem.QUANTUM) for which in (0, 1, 0, 1))
         self.steps = min(problem.STEPS, max(1, round(sample / spent)) * problem.QUANTUM)
 
     def sample(self, first: int) -> None:
         """One more sample of each; `first` goes first."""
         for which in (first, 1 - first):
-            self.samples[which].append(self._spent(which) * 1e9 / (self.steps * self.batch))
+            spent = self._spent(which, self.steps) - self.calls[which]
+            self.samples[which].append(spent * 1e9 / (self.steps * self.batch))
 
     @property
     def best(self) -> tuple[float, float]:
@@ -131,18 +136,22 @@ def table(races: dict[str, Race]) -> list[str]:
 
 def main() -> int:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.against", description=(__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.against", description=__doc__)
     parser.add_argument("other", type=Path, help="a checkout that `make install EXTRAS=dev,bench` was run in")
     parser.add_argument("--threshold", type=float, default=1.03, help="largest ratio that is no failure (default 1.03)")
-    parser.add_argument("--rounds", type=int, default=100, help="samples of each kernel (default 100)")
-    parser.add_argument("--sample", type=float, default=0.015, help="seconds of a sample (default 0.015)")
+    parser.add_argument("--rounds", type=int, default=1000, help="samples of each kernel (default 1000)")
+    parser.add_argument("--sample", type=float, default=0.0015, help="seconds of a sample (default 0.0015)")
     chosen = parser.parse_args()
     checkout = chosen.other.absolute()
     if not (checkout / ".venv" / "bin" / "python").exists():
         parser.error(f"there is no {checkout}/.venv/bin/python: run `make install` in the other checkout")
     if chosen.rounds < 1 or not chosen.sample > 0.0 or not chosen.threshold > 0.0:
         parser.error("--rounds, --sample and --threshold are to be positive")
-    races = race(checkout, chosen.rounds, chosen.sample)
+    try:
+        races = race(checkout, chosen.rounds, chosen.sample)
+    except subprocess.CalledProcessError as error:
+        last = error.stderr.strip().splitlines()[-1:]
+        parser.error(f"{checkout} has no springline to import ({''.join(last)}): run `make install` there")
     sys.stdout.write("\n".join(table(races)) + "\n")
     return int(any(min(one.ratios) > chosen.threshold for one in races.values()))
 
