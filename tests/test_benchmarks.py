@@ -1,5 +1,6 @@
 """The benchmark measures what it says: every contender does the same work, and the table tells of one that does not."""
 
+import ctypes
 import importlib
 import json
 import math
@@ -212,16 +213,15 @@ def test_two_checkouts_are_timed_in_one_process(
 
 
 def test_the_packages_of_another_checkout_are_its_own_and_ours_come_back(tmp_path: Path) -> None:
-    with against.packages_of(checkout(tmp_path)):
+    with against.packages_of(checkout(tmp_path) / ".venv" / "bin" / "python"):
         theirs = importlib.import_module("springline.benchmarks.problem")
         assert theirs is not problem
     assert importlib.import_module("springline.benchmarks.problem") is problem
 
 
 def test_a_kernel_that_is_slower_by_both_ratios_ends_with_1(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    race = against.Race((lambda delta, steps: delta, lambda delta, steps: delta), 1)
-    race.samples[0].extend([3.0, 2.2, 2.4])
-    race.samples[1].extend([2.0, 2.0, 2.0])
+    kernel = against.Timed(lambda delta, steps: delta, 1, against.Clock(ctypes.CDLL(None)))
+    race = against.Race((kernel, kernel), samples=([3.0, 2.2, 2.4], [2.0, 2.0, 2.0]))
     assert race.best == (2.2, 2.0)
     assert race.ratios == (1.1, 1.2)
     monkeypatch.setattr(against, "race", lambda *_: {"continuous": race})
