@@ -59,14 +59,14 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
     states, memory = program.size("x"), program.size("z")
     at = (x, f"{flat}(x + {states})") if memory else (x,)  # z stands behind the plant's state
     state = "sl_time now, const sl_group *x, const sl_group *p, const sl_group *r"
-    computed = "sl_group *u, sl_group *e, sl_group *sigma, sl_group *wished"
-    results = ["(double *)u", "(double *)e", "(double *)sigma", "(double *)wished"]
+    computed = "sl_group *u, sl_group *e, sl_group *sigma, sl_group *wished, sl_group *a_law"
+    results = [f"(double *){name}" for name in ("u", "e", "sigma", "wished", "a_law")]
     begin = "".join(
         f"\n  x[{states + k}][0] = slv_set({literal(value)});" for k, value in enumerate(program.system.z_start)
     )
     control = call("control", w, s, *at, p, r, results=results)
     sampling, sampled, sample = state, computed, control
-    closed = "  kernel_control(now, x, p, r, u, e, sigma, wished);"
+    closed = "  kernel_control(now, x, p, r, u, e, sigma, wished, a_law);"
     if memory:
         sampling, sampled = state.replace("*x,", "*x, double period,"), f"{computed}, sl_group *ahead"
         update = call("update", w, s, *at, "&period", p, r, results=["(double *)ahead"])

@@ -50,7 +50,7 @@ JOB = (
     Member("final_state", "double *", "runs x SL_NX"),
     Member("end_time", "double *", "runs, s: time of the final state"),
     Member("status", "int32_t *", "runs, enum sl_status"),
-    Member("quantity", "int32_t *", "runs, what left its bound: its place in a trajectory row, t not counted, or -1"),
+    Member("quantity", "int32_t *", "runs, what left its bound: its place in a row without t, then a_law, or -1"),
     Member("trajectory", "double *", "runs x rows x SL_NCOLUMNS, or NULL; a stopped run leaves later rows untouched"),
     Member("rows", "int64_t *", "runs, trajectory rows written, or NULL"),
     Member("capacity", "int64_t", "rows that `trajectory` has room for, per run"),

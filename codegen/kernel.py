@@ -114,7 +114,7 @@ class Runs:
     metrics      (runs, joints, len(METRICS)), NaN where there is none
     final_state  (runs, states), the last finite state, that of the controller behind the plant's;  end_time (runs,), s
     status       (runs,) index into STATUS
-    quantity     (runs,) place in a trajectory row, t not counted, of what left its bound (`quantity_name`), or -1
+    quantity     (runs,) place in System.judged of what left its bound (`quantity_name`), or -1
     trajectory   (runs, rows, columns) or None;  rows (runs,) rows that were written
     """
 
@@ -306,8 +306,8 @@ def chatters(chatter: Floats, duration: Floats | float) -> NDArray[np.bool_]:
 
 
 def quantity_name(system: System, quantity: int) -> str:
-    """Column name of what left its bound, "dq2_lift"; `quantity` as in Runs."""
-    return system.trajectory[1 + quantity].name
+    """Name of what left its bound, "dq2_lift"; `quantity` as in Runs."""
+    return system.judged[quantity].name
 
 
 def compile_kernel(program: Program, spec: KernelSpec) -> Kernel:

@@ -136,7 +136,7 @@ class _Emitter:
                 names[i] = f"{kind}{k}"
         signal = [f"{q}_{j}" for q in ("q1d", "dq1d", "ddq1d") for j in joints]
         name(outputs["signals"][0], signal + [f"{d}{c}" for d in ("", "d_", "dd_") for c in base])
-        for part, label in zip(outputs["control"], ("command", "e", "sigma", "wished"), strict=True):
+        for part, label in zip(outputs["control"], ("command", "e", "sigma", "wished", "a_law"), strict=True):
             name(part, [f"{label}_{j}" for j in joints])
         return names
 
@@ -239,6 +239,7 @@ class _Emitter:
         groups: Sequence[str],
         indent: str,
         fast: bool = False,
+        at_once: Sequence[int] = (),
     ) -> tuple[list[str], int]:
         """Statements that compute `wanted` and store them, and how many operations that takes per run.
 
@@ -246,6 +247,7 @@ class _Emitter:
         store   (position in wanted, value, group) -> a statement
         groups  C expressions of the group index that each statement is printed for, side by side
         fast    fast paths only; the masks ok, ok_0, ... tell where they hold
+        at_once  positions in wanted that are stored as soon as they are computed, so that no register keeps them
         """
         nodes = self.graph.nodes
         order = self._schedule(self.graph.needed(wanted, binding))
@@ -254,6 +256,16 @@ class _Emitter:
         present: set[int] = set()
         tested: set[int] = set()
         lines: list[str] = []
+        waiting: dict[int, list[int]] = {}
+        for position in at_once:
+            waiting.setdefault(wanted[position], []).append(position)
+        stored: set[int] = set()
+
+        def store_all(positions: Sequence[int]) -> None:
+            for position in positions:
+                value = partial(reference, wanted[position])
+                lines.extend(indent + store(position, value(s), g) for s, g in zip(suffixes, groups, strict=True))
+            stored.update(positions)
 
         def reference(i: int, suffix: str) -> str:
             node = nodes[i]
@@ -312,10 +324,10 @@ class _Emitter:
                 expression = self._expression(i, partial(reference, suffix=s), partial(mask, suffix=s), ok)
                 lines.append(f"{indent}const {kind} {self._label(i, s)} = {expression};")
             present.add(i)
+            store_all(waiting.get(i, ()))
         for i in wanted:
             fetch(i)
-        for position, i in enumerate(wanted):
-            lines.extend(indent + store(position, reference(i, s), g) for s, g in zip(suffixes, groups, strict=True))
+        store_all([position for position in range(len(wanted)) if position not in stored])
         return lines, len(order)
 
     # -- functions --------------------------------------------------------------------------------------------
@@ -387,7 +399,7 @@ class _Emitter:
         given = "const sl_group *p, const sl_group *r"
         now = "sl_time now, const sl_group *x"
         memory = self.program.size("z")
-        control = {"u": n, "e": n, "sigma": n, "wished": n}
+        control = {"u": n, "e": n, "sigma": n, "wished": n, "a_law": n_law}
         sampling, sample = (f"{now}, double period", control | {"ahead": memory}) if memory else (now, control)
         begun = [*outputs["start"][0], *map(self.graph.constant, self.program.system.z_start)]
 
@@ -415,6 +427,7 @@ class _Emitter:
                 groups,
                 "  ",
                 fast=True,
+                at_once=range(results.get("dx", 0), len(targets)),
             )
             fast = [
                 f"/* {self.counts[name]} operations a run */",

@@ -5,7 +5,7 @@
     signals(t, d, p, r) -> w          once per time: reference and base motion
     time(w, p, r) -> s                once per time: what else depends on time only
     error(w, s, x, p, r) -> e, sigma
-    control(w, s, x, p, r) -> u, e, sigma, wished   (u as it was before its limit)
+    control(w, s, x, p, r) -> u, e, sigma, wished, a_law   (u and the law as they were before their limits)
     plant(w, s, x, u, p, r) -> dx
 
 and where the controller has states, which error and control then take after x,
@@ -108,7 +108,12 @@ def program(structure: Structure) -> Program:
             "signals": ([t, d, p, r], staged["signals"], ["t", "d", "p", "r"], ["w"]),
             "time": ([w, p, r], [time.values], ["w", "p", "r"], ["s"]),
             "error": ([*at, p, r], staged["error"], [*names_at, "p", "r"], ["e", "sigma"]),
-            "control": ([*at, p, r], staged["control"], [*names_at, "p", "r"], ["u", "e", "sigma", "wished"]),
+            "control": (
+                [*at, p, r],
+                staged["control"],
+                [*names_at, "p", "r"],
+                ["u", "e", "sigma", "wished", "a_law"],
+            ),
             "plant": ([w, s, x, u, p, r], staged["plant"], ["w", "s", "x", "u", "p", "r"], ["dx"]),
         }
         if z:

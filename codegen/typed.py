@@ -22,7 +22,7 @@ STATUS = (
     ("BAD_PARAMETER", "a parameter is out of its range (springline.h): correct it and pass the configuration again"),
     ("BAD_REFERENCE", "a reference is not a finite number: check the trajectory generator; the fallback is commanded"),
     ("BAD_MEASUREMENT", "a measurement is not a finite number: check the sensors; the fallback is commanded"),
-    ("OVERFLOW", "the law left the finite numbers: set a_max or check the reference; the fallback is commanded"),
+    ("OVERFLOW", "the law left the finite numbers: check its gains and the reference; the fallback is commanded"),
     ("BAD_PLANT_INPUT", "state, command, base motion or step not finite, or step not positive: the state was kept"),
     ("DIVERGED", "the plant left the finite numbers: take a smaller step or check the commands; the state was kept"),
     ("BAD_TIME", "the time is not a finite number: correct it"),
@@ -191,14 +191,15 @@ class TypedInterface:
         ]
         values = [f"diagnostics->{field.name}" for field in diagnostics if not field.integer]
         ahead = [f"ahead->{field.name}" for field in self.structures.get("memory", ())]
+        asked = self.bodies["control"].values[-system.n :] if system.controller.law else []
         flags = [
             f"  diagnostics->saturated_{j.name} = command->U_{j.name} < {total} || command->U_{j.name} > {total};"
             for j, total in zip(system.joints, sums, strict=True)
         ]
-        wished_rates = self.bodies["control"].values[-system.n :] if system.controller.law else ()
-        for j, wished in zip(system.joints, wished_rates, strict=False):
+        for j, a_law in zip(system.joints, asked, strict=True):
             limit = self._parameter(f"control.a_max.{system.joints.index(j)}")
-            flags.append(f"  diagnostics->a_limited_{j.name} = {wished} < -{limit} || {wished} > {limit};")
+            flags.append(f"  diagnostics->a_limited_{j.name} = {a_law} < -{limit} || {a_law} > {limit};")
+        flags.append(f"  return {_all(f'springline_is_finite({a_law})' for a_law in asked)};")
         state = self.structures["state"]
         blocks |= {
             "status_enum": ",\n".join(f"  SPRINGLINE_{name} = {value}" for value, (name, _) in enumerate(STATUS)),

@@ -56,13 +56,13 @@ class TerminalSliding(Controller):
         """Command, error, sliding variable and the two parts of the command."""
         error = r.q - y.q1
         sigma, surface_rate = surface(error, r.dq - y.dq1, p, self.exponents)
-        u_e = reaching_rate(self.reaching, sigma, p, self.log_form) - surface_rate
-        wished = slow = slow_control(r.ddq, u_e, model(y.q1, y.dq1))
+        rate, a_law = reaching_rate(self.reaching, sigma, p, self.log_form)
+        wished = slow = slow_control(r.ddq, rate - surface_rate, model(y.q1, y.dq1))
         diagnostics = {SIGMA.name: sigma, U_S.name: slow}
         if "dq2" in y:
             fast = fast_control(y.dq1, y.dq2, p.K_f)
             wished, diagnostics[U_F.name] = slow + fast, fast
-        return Control(wished, error, diagnostics=diagnostics)
+        return Control(wished, error, diagnostics=diagnostics, asked=a_law)
 
 
 CONTROLLERS: dict[str, Controller] = {controller.name: controller for controller in (TerminalSliding(),)}

@@ -108,6 +108,7 @@ SIGMA = Quantity("sigma", r"\sigma", "{q}/s", "sliding variable")
 U_S = Quantity("U_s", "U_s", "{F}", "slow part of the command, before its limit")
 U_WISHED = Quantity("U_wished", r"U_w", "{F}", "command before its limit")
 U_F = Quantity("U_f", "U_f", "{F}", "fast part of the command, before its limit")
+A_LAW = Quantity("a_law", "a", "{q}/s^2", "acceleration that the reaching law asks for before a_max")
 SATURATED = Quantity("saturated", "U = U_{max}", "0 or 1", "whether U_max limits the command")
 A_LIMITED = Quantity("a_limited", "a = a_{max}", "0 or 1", "whether a_max limits the reaching law")
 

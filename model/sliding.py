@@ -184,7 +184,7 @@ class Power:
 LAWS: dict[str, ReachingLaw] = {law.name: law for law in (VariablePowerLog(), DoublePower(), Power())}
 
 
-def reaching_rate(law: ReachingLaw, sigma: ca.SX, p: Values, log_form: LogForm) -> ca.SX:
-    """The law's d sigma / dt per joint (n x 1), limited to +-a_max (E4)."""
+def reaching_rate(law: ReachingLaw, sigma: ca.SX, p: Values, log_form: LogForm) -> tuple[ca.SX, ca.SX]:
+    """The law's d sigma / dt per joint (n x 1), limited to +-a_max (E4), and what it was before."""
     wished = ca.vertcat(*(law.rate(sigma[i], p, log_form) for i in range(sigma.numel())))
-    return ca.fmin(ca.fmax(wished, -p.a_max), p.a_max)
+    return ca.fmin(ca.fmax(wished, -p.a_max), p.a_max), wished

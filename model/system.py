@@ -28,6 +28,7 @@ from springline.model.mechanism import Mechanism
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
 from springline.model.quantities import (
+    A_LAW,
     BASE,
     DQ1,
     DQ2,
@@ -329,6 +330,11 @@ class System:
         return entries(self.columns, self.joints)
 
     @property
+    def judged(self) -> tuple[Entry, ...]:
+        """What may end a run by leaving its bound, in the order in which the loop counts it: a row without t, a_law."""
+        return (*self.trajectory[1:], *entries((A_LAW,), self.joints))
+
+    @property
     def metrics(self) -> tuple[Entry, ...]:
         """Columns of a table of metrics: each for every joint."""
         return entries(METRICS, self.joints)
@@ -434,7 +440,7 @@ class System:
         z_in, z_names = ([self.z], ["z"]) if self.controller.states else ([], [])
         ins, names = [w, x, *z_in], ["w", "x", *z_names]
         y = ca.vertcat(*sensed(self.structure.effects, self._state).values())
-        seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished]
+        seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished, commanded.a_law]
         later = [commanded.dz, commanded.ahead]
         if self.structure.effects:
             seen, later = (ca.substitute(values, [x], [y]) for values in (seen, later))
@@ -442,7 +448,7 @@ class System:
             **function("measure", [x], [y], ["x"], ["y"]),
             **function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
             **function("start", [self.t, self.d], [self._start(real)], ["t", "d"], ["x"]),
-            **function("loop_control", ins, seen, names, ["u", "e", "sigma", "wished"]),
+            **function("loop_control", ins, seen, names, ["u", "e", "sigma", "wished", "a_law"]),
             **function("loop_error", ins, seen[1:3], names, ["e", "sigma"]),
             **function("loop_plant", [w, x, self.u], [dx], ["w", "x", "u"], ["dx"]),
         }

@@ -103,6 +103,8 @@ def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tup
         return status, f"done: {end:g} s in {settings.steps} steps{_chatter_text(system.joints, runs, run)}"
     place = int(runs.quantity[run])
     quantity = quantity_name(system, place)
+    if place >= len(system.trajectory) - 1:  # no column has its name
+        quantity = f"the {system.judged[place].meaning}"
     left = "the finite numbers" if status == "diverged" else f"its bound (|{quantity}| <= {settings.bound:g})"
     states = (*entries(system.drive.state, system.joints), *system.memory)
     if quantity in {entry.name for entry in states}:

@@ -1,5 +1,7 @@
 """The benchmark measures what it says: every contender does the same work, and the table tells of one that does not."""
 
+import ctypes
+import importlib
 import json
 import math
 import platform
@@ -13,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from springline.benchmarks import harness, math_speed, problem, roofline, same_bits, work_precision
+from springline.benchmarks import against, harness, math_speed, problem, roofline, same_bits, work_precision
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, handwritten_c, ours
 from springline.codegen.kernel import KernelOptions, kernel
@@ -187,6 +189,45 @@ def test_checkouts_that_differ_end_the_comparison_with_1(
         monkeypatch.setattr(same_bits, "results", results)
         assert same_bits.main() == expected
     assert "q1 from row 0 on (1.0, and 1.5 in the other), by at most 0.5" in capsys.readouterr().out
+
+
+def checkout(folder: Path) -> Path:
+    """A folder that looks like a checkout: it has the springline of these tests."""
+    python = folder / ".venv" / "bin" / "python"
+    python.parent.mkdir(parents=True)
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
+    python.chmod(0o755)
+    return folder
+
+
+def test_two_checkouts_are_timed_in_one_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    argv = ["against", str(checkout(tmp_path)), "--rounds", "2", "--sample", "1e-3", "--threshold", "1e3"]
+    monkeypatch.setattr(sys, "argv", argv)
+    assert against.main() == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 1 + len(against.WORK)
+    assert all(len(line) <= 80 for line in lines)
+    assert all(float(line.split()[-1]) > 0.0 for line in lines[1:])
+
+
+def test_the_packages_of_another_checkout_are_its_own_and_ours_come_back(tmp_path: Path) -> None:
+    with against.packages_of(checkout(tmp_path) / ".venv" / "bin" / "python"):
+        theirs = importlib.import_module("springline.benchmarks.problem")
+        assert theirs is not problem
+    assert importlib.import_module("springline.benchmarks.problem") is problem
+
+
+def test_a_kernel_that_is_slower_by_both_ratios_ends_with_1(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kernel = against.Timed(lambda delta, steps: delta, 1, against.Clock(ctypes.CDLL(None)))
+    race = against.Race((kernel, kernel), samples=([3.0, 2.2, 2.4], [2.0, 2.0, 2.0]))
+    assert race.best == (2.2, 2.0)
+    assert race.ratios == (1.1, 1.2)
+    monkeypatch.setattr(against, "race", lambda *_: {"continuous": race})
+    for threshold, expected in (("1.09", 1), ("1.15", 0), ("1.25", 0)):
+        monkeypatch.setattr(sys, "argv", ["against", str(checkout(tmp_path / threshold)), "--threshold", threshold])
+        assert against.main() == expected
 
 
 def test_a_checkout_without_a_scenario_is_no_difference(tmp_path: Path) -> None:

@@ -18,7 +18,6 @@
 #include <fenv.h>
 #include <float.h>
 #include <stddef.h>
-#include <string.h>
 
 #include "kernel.h"
 #include "simulate.h"
@@ -76,9 +75,11 @@ typedef struct {
   int live;                        /* of these, still running */
   unsigned char alive[SL_PACK];
   sl_group p[SL_NP + 1], r[SL_NR + 1];
-  sl_group x[SL_NX], u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
-  sl_group wished[SL_NJ];          /* u before its limit, which turns infinity and NaN into numbers */
-  sl_group at[SL_NX], next[SL_NX]; /* where a stage is evaluated, and the next state as far as it is summed up */
+  sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
+  sl_group wished[SL_NJ], a_law[SL_NJ]; /* u and the law before their limits, which turn what is no number into one */
+  sl_group states[2][SL_NX];       /* x and next, in turn */
+  sl_group *x, *next;              /* the state, and the next one as far as it is summed up */
+  sl_group at[SL_NX];              /* where a stage is evaluated */
   sl_group kept[SL_KEPT + 1][SL_NX];              /* slopes of the stages that sl_kept names */
   sl_time times[SL_INSTANTS + 1];                 /* the nodes of the step, and its end */
   sl_group varying[SL_INSTANTS + 1][SL_NV + 1];   /* what varies at these times, in turn */
@@ -166,14 +167,14 @@ static void stop_runaways(sl_pack *pack, int64_t k, double bound) {
   }
 }
 
-/* Whether e, sigma and the wished u are finite in all lanes, for their sum is not if one of them is not. */
+/* Whether what the control computed is finite in all lanes: if the sum is, all of it is. */
 static int control_is_finite(const sl_pack *pack) {
   const sl_v limit = slv_set(DBL_MAX);
   sl_m finite = slv_yes();
   int i, g;
   for (g = 0; g < SL_G; g++) {
     sl_v sum = slv_set(0.0);
-    for (i = 0; i < SL_NJ; i++) sum = sum + pack->e[i][g] + pack->sigma[i][g] + pack->wished[i][g];
+    for (i = 0; i < SL_NJ; i++) sum = sum + pack->e[i][g] + pack->sigma[i][g] + pack->wished[i][g] + pack->a_law[i][g];
     finite = finite & (slv_fabs(sum) <= limit);
   }
   return slv_all(finite);
@@ -181,18 +182,22 @@ static int control_is_finite(const sl_pack *pack) {
 
 /* Ends the runs whose control is not finite at step k; they keep the state it was computed from. */
 SL_RARE void stop_overflows(sl_pack *pack, int64_t k, sl_time now) {
-  const sl_group *const computed[3] = {pack->e, pack->sigma, pack->wished};
+  enum { KINDS = 4, ROW = SL_NCOLUMNS - 1 };
+  const sl_group *const computed[KINDS] = {pack->e, pack->sigma, pack->a_law, pack->wished};
+  static const int place[KINDS] = {SL_NX + SL_NJ, SL_NX + 2 * SL_NJ, ROW, SL_NX + 3 * SL_NJ}; /* a_law is in no row */
   int lane, bad, i;
   for (lane = 0; lane < pack->lanes; lane++) {
     if (!pack->alive[lane]) continue;
-    for (bad = 0; bad < 3 * SL_NJ && sl_isfinite(lane_of(computed[bad / SL_NJ][bad % SL_NJ], lane)); bad++) continue;
-    if (bad == 3 * SL_NJ) continue;
+    for (bad = 0; bad < KINDS * SL_NJ; bad++) {
+      if (!sl_isfinite(lane_of(computed[bad / SL_NJ][bad % SL_NJ], lane))) break;
+    }
+    if (bad == KINDS * SL_NJ) continue;
     for (i = 0; i < SL_NJ; i++) { /* no command is applied any more: the row shows what was wished */
       const double wished = lane_of(pack->wished[i], lane);
       if (!sl_isfinite(wished)) set_lane(pack->u[i], lane, wished);
     }
     if (pack->job->output_every > 0) write_row(pack, k, now, lane, lane + 1);
-    finish_lane(pack, lane, k, SL_DIVERGED, SL_NPLANT + SL_NJ + (bad < 2 * SL_NJ ? bad : bad - SL_NJ + SL_NSIGMA));
+    finish_lane(pack, lane, k, SL_DIVERGED, place[bad / SL_NJ] + bad % SL_NJ);
   }
 }
 
@@ -228,11 +233,11 @@ static void run_stage(sl_pack *pack, int64_t k, int stage) {
   kernel_plant(pack->times[sl_when[stage]], at, (const sl_group *)pack->u, p, r, slope);
 #else
   if (stage == 0) {
-    kernel_closed(pack->times[0], at, p, r, slope, pack->u, pack->e, pack->sigma, pack->wished);
+    kernel_closed(pack->times[0], at, p, r, slope, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
     observe(pack, k, pack->times[0]);
   } else {
-    sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ], wished[SL_NJ];
-    kernel_closed(pack->times[sl_when[stage]], at, p, r, slope, u, e, sigma, wished);
+    sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ], wished[SL_NJ], a_law[SL_NJ];
+    kernel_closed(pack->times[sl_when[stage]], at, p, r, slope, u, e, sigma, wished, a_law);
   }
 #endif
   kernel_update(stage, pack->job->step, x, slope, pack->kept, pack->next, pack->at);
@@ -245,9 +250,9 @@ static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
   if (k % pack->job->hold == 0) {
 #if SL_NZ > 0
     const double period = (double)pack->job->hold * pack->job->step;
-    kernel_control(now, x, period, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->next + SL_NPLANT);
+    kernel_control(now, x, period, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law, pack->next + SL_NPLANT);
 #else
-    kernel_control(now, x, p, r, pack->u, pack->e, pack->sigma, pack->wished);
+    kernel_control(now, x, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
 #endif
   } else {
     kernel_error(now, x, p, r, pack->e, pack->sigma);
@@ -262,7 +267,7 @@ static void control_at_end(sl_pack *pack, int64_t k, sl_time now) {
 #else
   sl_group slope[SL_NX];
   kernel_closed(now, (const sl_group *)pack->x, (const sl_group *)pack->p, (const sl_group *)pack->r, slope, pack->u,
-                pack->e, pack->sigma, pack->wished);
+                pack->e, pack->sigma, pack->wished, pack->a_law);
   (void)k;
 #endif
 }
@@ -272,6 +277,8 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
   int lane, i;
   pack->job = job;
   pack->clock = clock;
+  pack->x = pack->states[0];
+  pack->next = pack->states[1];
   pack->lanes = (int)(job->last - first < SL_PACK ? job->last - first : SL_PACK);
   pack->live = pack->lanes;
   for (lane = 0; lane < SL_PACK; lane++) {
@@ -312,8 +319,10 @@ static void begin_step(sl_pack *pack, int64_t k) {
 }
 
 static void end_step(sl_pack *pack, int64_t k, double bound) {
-  if (!within((const sl_group *)pack->next, bound)) stop_runaways(pack, k, bound);
-  memcpy(pack->x, pack->next, sizeof pack->x);
+  sl_group *next = pack->next;
+  if (!within((const sl_group *)next, bound)) stop_runaways(pack, k, bound);
+  pack->next = pack->x;
+  pack->x = next;
 }
 
 /* What is left after step k - 1, the last. */

@@ -636,6 +636,11 @@ def test_what_overflows_never_becomes_a_limit(library: Callable[[str], Library])
     case.measurement.q1_lift = 1e200  # e^3 overflows; sigma is infinite
     assert case.step() == "OVERFLOW"
     assert values(case.command) == [0.0, 0.0]
+    for gain in ("k1", "k2", "k3"):  # the law's sum overflows, which a_max would hide
+        case = Case(library("tunable"), **{f"control_{gain}": 1e308})
+        assert case.step() == "OVERFLOW"
+        assert values(case.command) == [0.0, 0.0]
+        assert not any(values(case.diagnostics))
     case = Case(library("tunable"), control_a_max_lift=math.inf, control_K_f_lift=1e300, **limits)
     case.measurement.dq1_lift, case.measurement.dq2_lift = 1e10, -1e10
     assert case.step() == "OVERFLOW"

@@ -414,6 +414,23 @@ def test_steps_that_cannot_be(build: Build, open_fmu: Open, version: int) -> Non
     client.start().step(0.0)
 
 
+@pytest.mark.parametrize(("settings", "version"), [(SAMPLED, 2), (CONTINUOUS, 3)])
+@pytest.mark.parametrize("part", ["controller", "loop"])
+def test_a_law_that_overflows_before_a_max_is_an_error(
+    build: Build, open_fmu: Open, part: str, settings: Settings, version: int
+) -> None:
+    client = open_fmu(build(part, version, settings))
+    client.set(["control.k1"], [1e308])
+
+    def begin() -> None:
+        client.start()
+        if part == "controller":
+            client.set(["q1d_lift", "q1d_rotation"], [1.0, 1.0])
+            client.get(["U_lift"])
+
+    refused(client, begin, "the law left the finite numbers")
+
+
 @pytest.mark.parametrize("version", [2, 3])
 def test_null_pointers_and_foreign_tokens(build: Build, open_fmu: Open, version: int) -> None:
     """Called as C may call it: with nothing where something is expected. Errors, never a crash."""

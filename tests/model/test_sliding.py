@@ -230,7 +230,7 @@ def test_a_max_limits_the_sum_of_the_law_only():
     """E4: per joint, on the law's sum, before the surface's own derivative is subtracted."""
     sigma = ca.SX.sym("sigma", 2)
     p = Values({**{k: ca.SX(v) for k, v in TABLE_3.items()}, "a_max": ca.SX([200.0, math.inf])})
-    f = ca.Function("rate", [sigma], [reaching_rate(LAWS["variable_power_log"], sigma, p, "power")])
+    f = ca.Function("rate", [sigma], [reaching_rate(LAWS["variable_power_log"], sigma, p, "power")[0]])
     lift, rotation = np.array(f([-7.64, -7.64])).reshape(-1)
     assert lift == 200.0
     assert rotation == pytest.approx(3.5e6, rel=0.1)

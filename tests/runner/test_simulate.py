@@ -120,6 +120,19 @@ def test_an_overflow_that_the_limits_hide_is_told(engine: str, overrides: dict[s
     assert not np.isfinite(result.trajectory[quantity].to_numpy()).any()
 
 
+@pytest.mark.parametrize("engine", ["lanes", "casadi"])
+@pytest.mark.parametrize("a_max", [200.0, float("inf")])
+def test_a_law_that_overflows_before_a_max_is_told_in_words(engine: str, a_max: float) -> None:
+    scenario = load_scenario("paper/nominal", {"control.k1": 1e308, "control.a_max": a_max})
+    result = simulate(scenario, engine=engine)  # type: ignore[arg-type] # parametrized
+    assert (result.status, result.message) == (
+        "diverged",
+        "diverged: the acceleration that the reaching law asks for before a_max (lift) left the finite numbers "
+        "at t = 0 s, where results end",
+    )
+    assert len(result.trajectory) == 1
+
+
 @pytest.mark.parametrize(
     ("changes", "told"),
     [

@@ -14,10 +14,12 @@ static const springline_command springline_no_command = {{zero_command}};
 static const springline_diagnostics springline_no_diagnostics = {{zero_diagnostics}};
 static const springline_base springline_base_at_rest = {{zero_base}};
 {{initial_memory}}
+static int springline_is_finite(springline_real x) { return {{math}}_isfinite(x); }
+
 /* ---- the model, printed from the frozen expressions ------------------------------------------------------- */
 
-{{derive}}/* {{control_operations}} operations */
-static void springline_evaluate_control(const springline_controller *controller, const springline_reference *reference,
+{{derive}}/* Whether the acceleration that the law asks for is finite, before a_max; {{control_operations}} operations */
+static int springline_evaluate_control(const springline_controller *controller, const springline_reference *reference,
                                         const springline_measurement *measurement, springline_command *command,
                                         springline_diagnostics *diagnostics{{ahead_parameter}}) {
 {{control}}
@@ -31,8 +33,6 @@ static void springline_evaluate_plant(const springline_controller *controller, c
 }
 
 /* ---- checks ------------------------------------------------------------------------------------------------ */
-
-static int springline_is_finite(springline_real x) { return {{math}}_isfinite(x); }
 
 static int springline_reference_is_finite(const springline_reference *reference) {
   return {{reference_is_finite}};
@@ -125,8 +125,9 @@ int springline_step(springline_controller *controller, const springline_referenc
   } else if (!springline_measurement_is_finite(measurement)) {
     status = SPRINGLINE_BAD_MEASUREMENT;
   } else {
-    springline_evaluate_control(controller, reference, measurement, &wished, &seen{{ahead_argument}});
-    if (!springline_control_is_finite(&seen{{ahead_argument}})) status = SPRINGLINE_OVERFLOW;
+    const int finite =
+        springline_evaluate_control(controller, reference, measurement, &wished, &seen{{ahead_argument}});
+    if (!finite || !springline_control_is_finite(&seen{{ahead_argument}})) status = SPRINGLINE_OVERFLOW;
   }
   if (status == SPRINGLINE_OK) {
     controller->last = wished;
