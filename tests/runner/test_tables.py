@@ -216,7 +216,7 @@ def test_a_digit_is_what_the_last_place_written_is_worth() -> None:
     assert bound([f"0e{'9' * 5000}", *bent[1:]]) == as_ramp
 
 
-@pytest.mark.parametrize("share", [0.0, 0.4, 1.0, 1.6, 5.0])
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0, 1.1, 1.6, 5.0])
 @pytest.mark.parametrize("last", [False, True])
 def test_how_far_astray_counts_as_much_of_the_way_as_the_run_sees(share: float, last: bool) -> None:
     t = 0.25 * np.arange(41)
