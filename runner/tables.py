@@ -127,8 +127,9 @@ class Table:
         Of the times from 0 to `duration`, s; NaN for a channel that leaves its range by less than half of it.
         """
         before, after = (intervals[:, :, 0] for intervals in self.rests())
-        early, late = math.ceil(self.t0 / self.dt), math.floor((duration - self.end) / self.dt)
-        values = np.concatenate([before[len(before) - max(early, 0) :][: len(before)], after[: max(late + 1, 0)]])
+        early = min(max(math.ceil(self.t0 / self.dt), 0), len(before))
+        late = max(math.floor((duration - self.end) / self.dt) + 1, 0)
+        values = np.concatenate([before[len(before) - early :], after[:late]])
         own = self.coefficients[:, :, 0]
         middle, range_ = (own.max(axis=0) + own.min(axis=0)) / 2, np.ptp(own, axis=0)
         if not len(values):

@@ -216,6 +216,20 @@ def test_a_digit_is_what_the_last_place_written_is_worth() -> None:
     assert bound([f"0e{'9' * 5000}", *bent[1:]]) == as_ramp
 
 
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0, 1.1, 1.6, 5.0])
+@pytest.mark.parametrize("last", [False, True])
+def test_how_far_astray_counts_as_much_of_the_way_as_the_run_sees(share: float, last: bool) -> None:
+    t = 0.25 * np.arange(41)
+    record = (t + 0.2 * np.sin(t))[:, None]
+    way = spline(0.0, 0.25, record, "hold").rests()[last]
+    seen = int(share * len(way))
+    part = way[: seen + 1, 0, 0] if last else way[len(way) - min(seen, len(way)) :, 0, 0]
+    far = part[np.abs(part - 5.0).argmax()] if len(part) else 5.0
+    table = spline(0.0 if last else 0.25 * seen, 0.25, record, "hold")
+    (found,) = table.astray(10.0 + 0.25 * seen if last else table.end - 1.0)
+    assert (found == far) if abs(far - record.mean()) > np.ptp(record) else math.isnan(found)
+
+
 # Between them
 
 
