@@ -399,7 +399,7 @@ class _Emitter:
         given = "const sl_group *p, const sl_group *r"
         now = "sl_time now, const sl_group *x"
         memory = self.program.size("z")
-        control = {"u": n, "e": n, "sigma": n, "wished": n, "a_law": n_law}
+        control = {"u": n, "e": n, "sigma": n, "wished": n, "a_law": n}
         sampling, sample = (f"{now}, double period", control | {"ahead": memory}) if memory else (now, control)
         begun = [*outputs["start"][0], *map(self.graph.constant, self.program.system.z_start)]
 

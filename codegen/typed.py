@@ -196,10 +196,11 @@ class TypedInterface:
             f"  diagnostics->saturated_{j.name} = command->U_{j.name} < {total} || command->U_{j.name} > {total};"
             for j, total in zip(system.joints, sums, strict=True)
         ]
-        for j, a_law in zip(system.joints, asked, strict=True):
-            limit = self._parameter(f"control.a_max.{system.joints.index(j)}")
-            flags.append(f"  diagnostics->a_limited_{j.name} = {a_law} < -{limit} || {a_law} > {limit};")
-        flags.append(f"  return {_all(f'springline_is_finite({a_law})' for a_law in asked)};")
+        for k, a_law in enumerate(asked):
+            limit = self._parameter(f"control.a_max.{k}")
+            name = system.joints[k].name
+            flags.append(f"  diagnostics->a_limited_{name} = {a_law} < -{limit} || {a_law} > {limit};")
+        flags.append(f"  return {_all(f'springline_is_finite({a_law})' for a_law in asked) or '1'};")
         state = self.structures["state"]
         blocks |= {
             "status_enum": ",\n".join(f"  SPRINGLINE_{name} = {value}" for value, (name, _) in enumerate(STATUS)),

@@ -62,7 +62,7 @@ class TerminalSliding(Controller):
         if "dq2" in y:
             fast = fast_control(y.dq1, y.dq2, p.K_f)
             wished, diagnostics[U_F.name] = slow + fast, fast
-        return Control(wished, error, diagnostics=diagnostics, asked=a_law)
+        return Control(wished, error, diagnostics=diagnostics, a_law=a_law)
 
 
 CONTROLLERS: dict[str, Controller] = {controller.name: controller for controller in (TerminalSliding(),)}

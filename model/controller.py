@@ -66,12 +66,15 @@ class Control:
     dz           time derivatives of its states
     error        tracking error, n x 1
     diagnostics  what else it declares to show, by the quantities' names
+    a_law        what its reaching law asks for before a_max limits it, n x 1; None without a law. The loop checks it,
+                 for a limit turns infinity into a number
     """
 
     u: ca.SX
     error: ca.SX
     dz: Rates = field(default_factory=dict)
     diagnostics: Mapping[str, ca.SX] = field(default_factory=dict)
+    a_law: ca.SX | None = None
 
 
 class Controller(ABC):
@@ -120,7 +123,7 @@ class ControlSignals:
 
     command  what the motors are told, after the limit;  wished: before it
     parts    what `wished` is the sum of, by quantity
-    error    tracking error;  sigma: sliding variable, zero where the controller has none
+    error    tracking error;  sigma: sliding variable;  a_law: the law before a_max; both zero where there is none
     dz       rates of the states as one column;  ahead: the states one sample later
     """
 
@@ -129,6 +132,7 @@ class ControlSignals:
     parts: dict[Quantity, ca.SX]
     error: ca.SX
     sigma: ca.SX
+    a_law: ca.SX
     dz: ca.SX
     ahead: ca.SX
 
@@ -188,6 +192,9 @@ def commanded(
         return ca.vertcat(*found.values()) if found else ca.SX(0, 1)
 
     wished, error = column("u", given.u, n), column("error", given.error, n)
+    if controller.law and given.a_law is None:
+        raise ValueError(f"controller {controller.name}: Control has no a_law, expected what its law asks for")
+    a_law = ca.SX.zeros(n) if given.a_law is None else column("a_law", given.a_law, n)
     shown = named("diagnostics", given.diagnostics, controller.diagnostics)
     if SIGMA in controller.diagnostics and SIGMA.name not in shown:
         raise ValueError(f"controller {controller.name}: diagnostics has no 'sigma', which the class declares")
@@ -200,4 +207,5 @@ def commanded(
     dz = stacked("dz", given.dz)
     later = controller.update(r, y, states, model, p, h)
     ahead = z + h * dz if later is None else stacked("update", later)
-    return ControlSignals(command, wished, parts, error, shown.get(SIGMA.name, ca.SX.zeros(n)), dz, ahead)
+    sigma = shown.get(SIGMA.name, ca.SX.zeros(n))
+    return ControlSignals(command, wished, parts, error, sigma, a_law, dz, ahead)

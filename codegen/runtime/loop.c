@@ -3,9 +3,10 @@
  *
  * A pack is SL_G groups of SL_W lanes, a lane is one run; SL_PACKS packs go through time side by side. "kernel.h" comes
  * from a generator and provides
- *   sizes        SL_W SL_G SL_PACKS; SL_NJ joints, SL_NX states, the last SL_NZ of them the controller's, SL_NB base coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV
- *                (values bound once per run; once per time and the same for all runs; once per time and run),
- *                SL_ND, SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller has a sliding variable) 0 or 1
+ *   sizes        SL_W SL_G SL_PACKS; SL_NJ joints, SL_NX states, the last SL_NZ of them the controller's, SL_NB base
+ *                coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV (values bound once per run; once per time and the same
+ *                for all runs; once per time and run), SL_ND, SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller
+ *                has a sliding variable) 0 or 1
  *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
@@ -18,6 +19,7 @@
 #include <fenv.h>
 #include <float.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "kernel.h"
 #include "simulate.h"
@@ -184,7 +186,8 @@ static int control_is_finite(const sl_pack *pack) {
 SL_RARE void stop_overflows(sl_pack *pack, int64_t k, sl_time now) {
   enum { KINDS = 4, ROW = SL_NCOLUMNS - 1 };
   const sl_group *const computed[KINDS] = {pack->e, pack->sigma, pack->a_law, pack->wished};
-  static const int place[KINDS] = {SL_NX + SL_NJ, SL_NX + 2 * SL_NJ, ROW, SL_NX + 3 * SL_NJ}; /* a_law is in no row */
+  static const int place[KINDS] = {SL_NPLANT + SL_NJ, SL_NPLANT + 2 * SL_NJ, ROW, SL_NPLANT + 2 * SL_NJ + SL_NSIGMA};
+  /* a_law is in no row */
   int lane, bad, i;
   for (lane = 0; lane < pack->lanes; lane++) {
     if (!pack->alive[lane]) continue;
@@ -250,12 +253,16 @@ static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
   if (k % pack->job->hold == 0) {
 #if SL_NZ > 0
     const double period = (double)pack->job->hold * pack->job->step;
-    kernel_control(now, x, period, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law, pack->next + SL_NPLANT);
+    kernel_control(now, x, period, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law,
+                   pack->next + SL_NPLANT);
 #else
     kernel_control(now, x, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
 #endif
   } else {
     kernel_error(now, x, p, r, pack->e, pack->sigma);
+#if SL_NZ > 0
+    memcpy(pack->next + SL_NPLANT, x + SL_NPLANT, SL_NZ * sizeof(sl_group)); /* held */
+#endif
   }
 }
 #endif
