@@ -2,7 +2,8 @@
 
 Walking the frozen instruction lists, equal operations on equal arguments become one node (value numbering), so work is
 shared across Functions. Baked parameters are constants here, and exact operations on constants (+ - * / sqrt and
-comparisons, which IEEE 754 fixes to the last bit) are done; transcendental ones never are. Nothing is regrouped.
+comparisons, which IEEE 754 fixes to the last bit) are done; transcendental ones never are. A limit at infinity goes: NaN,
+which it would turn into infinity, stays NaN, and the loop stops at either. Nothing is regrouped.
 """
 
 from __future__ import annotations
@@ -70,6 +71,8 @@ _EXACT: dict[int, Callable[..., float]] = {
     ca.OP_IF_ELSE_ZERO: lambda c, a: a if c else 0.0,
 }
 
+_NO_LIMIT = {ca.OP_FMIN: math.inf, ca.OP_FMAX: -math.inf}
+
 
 class ValueGraph:
     """Value-numbered nodes; `outputs[function][k]` are the nodes of a Function's k-th output, entry by entry."""
@@ -101,6 +104,8 @@ class ValueGraph:
                 return self.constant(_EXACT[op](*(node.value for node in nodes)))
             except (ZeroDivisionError, ValueError):
                 pass  # 1/0, sqrt(-1): left to C, which knows Inf and NaN
+        if op in _NO_LIMIT and nodes[1].binding is Binding.CONSTANT and nodes[1].value == _NO_LIMIT[op]:
+            return arguments[0]
         key = (op, tuple(sorted(arguments)) if op in _COMMUTATIVE else arguments)
         varies = any(node.varies for node in nodes)
         binding = max(Binding.RUN, *(node.binding for node in nodes))

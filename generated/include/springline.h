@@ -14,7 +14,7 @@
  *     dq2_lift (m/s), dq2_rotation (rad/s)
  * base: y_r1 (m), theta_1z (rad), theta_1x (rad), d_y_r1 (m/s), d_theta_1z (rad/s), d_theta_1x (rad/s), dd_y_r1
  *     (m/s^2), dd_theta_1z (rad/s^2), dd_theta_1x (rad/s^2)
- * operations: measure 0, control 122, plant 106, start 0, signals 18 (a plant step takes 4 plant evaluations)
+ * operations: measure 0, control 118, plant 106, start 0, signals 18 (a plant step takes 4 plant evaluations)
  */
 #ifndef SPRINGLINE_H
 #define SPRINGLINE_H

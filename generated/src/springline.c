@@ -14,7 +14,7 @@
  *     dq2_lift (m/s), dq2_rotation (rad/s)
  * base: y_r1 (m), theta_1z (rad), theta_1x (rad), d_y_r1 (m/s), d_theta_1z (rad/s), d_theta_1x (rad/s), dd_y_r1
  *     (m/s^2), dd_theta_1z (rad/s^2), dd_theta_1x (rad/s^2)
- * operations: measure 0, control 122, plant 106, start 0, signals 18 (a plant step takes 4 plant evaluations)
+ * operations: measure 0, control 118, plant 106, start 0, signals 18 (a plant step takes 4 plant evaluations)
  */
 #include "springline.h"
 
@@ -36,7 +36,7 @@ static int springline_is_finite(springline_real x) { return sl_isfinite(x); }
 
 /* ---- the model, printed from the frozen expressions ------------------------------------------------------- */
 
-/* Whether the acceleration that the law asks for is finite, before a_max; 122 operations */
+/* Whether the acceleration that the law asks for is finite, before a_max; 118 operations */
 static int springline_evaluate_control(const springline_controller *controller, const springline_reference *reference,
                                         const springline_measurement *measurement, springline_command *command,
                                         springline_diagnostics *diagnostics) {
@@ -161,20 +161,16 @@ static int springline_evaluate_control(const springline_controller *controller, 
   const double dq2_lift = measurement->dq2_lift;
   const double a107 = dq1_lift - dq2_lift;
   const double u_f_lift = 200.0 * a107;
-  const double a109 = u_s_lift + u_f_lift;
-  const double a110 = sl_fmax(a109, -SL_INF);
-  const double u_lift = sl_fmin(a110, SL_INF);
-  const double a112 = a50 * a47;
-  const double a113 = 29.215333333333334 * a98;
-  const double a114 = a112 + a113;
-  const double a115 = 290.08 * cos_q1_rotation;
-  const double u_s_rotation = a114 + a115;
+  const double u_lift = u_s_lift + u_f_lift;
+  const double a110 = a50 * a47;
+  const double a111 = 29.215333333333334 * a98;
+  const double a112 = a110 + a111;
+  const double a113 = 290.08 * cos_q1_rotation;
+  const double u_s_rotation = a112 + a113;
   const double dq2_rotation = measurement->dq2_rotation;
-  const double a117 = dq1_rotation - dq2_rotation;
-  const double u_f_rotation = 2.6 * a117;
-  const double a119 = u_s_rotation + u_f_rotation;
-  const double a120 = sl_fmax(a119, -SL_INF);
-  const double u_rotation = sl_fmin(a120, SL_INF);
+  const double a115 = dq1_rotation - dq2_rotation;
+  const double u_f_rotation = 2.6 * a115;
+  const double u_rotation = u_s_rotation + u_f_rotation;
   command->U_lift = u_lift;
   command->U_rotation = u_rotation;
   diagnostics->U_s_lift = u_s_lift;
