@@ -2,8 +2,8 @@
 
 Walking the frozen instruction lists, equal operations on equal arguments become one node (value numbering), so work is
 shared across Functions. Baked parameters are constants here, and exact operations on constants (+ - * / sqrt and
-comparisons, which IEEE 754 fixes to the last bit) are done; transcendental ones never are. A limit at infinity goes: NaN,
-which it would turn into infinity, stays NaN, and the loop stops at either. Nothing is regrouped.
+comparisons, which IEEE 754 fixes to the last bit) are done; transcendental ones never are. A limit at infinity goes:
+NaN, which it would turn into infinity, stays NaN, and the loop stops at either. Nothing is regrouped.
 """
 
 from __future__ import annotations
