@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
-from springline.model.controller import ArmModel, ArmTerms, Control, Controller
+from springline.model.controller import ArmModel, ArmTerms, Control, Controller, check_controller
 from springline.model.parameters import LIMIT, NON_NEGATIVE, Parameter, Values
 from springline.model.quantities import SIGMA, U_F, U_S
-from springline.model.sliding import LAWS, LogForm, ReachingLaw, SurfaceExponents, reaching_rate, surface
+from springline.model.registry import Registry
+from springline.model.sliding import LAWS, Law, SurfaceExponents, reaching_rate, surface
 
 K_F = Parameter("K_f", "{F} s/{q}", 0.0, "fast control gain on dq1 - dq2", NON_NEGATIVE, per_joint=True)
 U_MAX = Parameter("U_max", "{F}", float("inf"), "limit on the motor force", LIMIT, per_joint=True)
@@ -30,7 +31,6 @@ class TerminalSliding(Controller):
     """The composite law U = U_s + U_f                                                             (13), (25), E4.
 
     reaching   how the sliding variable shall go to zero
-    log_form   of a law that has a logarithm
     exponents  of the surface
     Its parameters are those of the [control] table; the rigid drive has no fast part.
     """
@@ -39,24 +39,23 @@ class TerminalSliding(Controller):
     title = "computed torque on a terminal sliding surface"
     diagnostics = (SIGMA, U_S, U_F)
 
-    reaching: ReachingLaw = LAWS["variable_power_log"]
-    log_form: LogForm = "power"
+    reaching: Law = LAWS["variable_power_log"]
     exponents: SurfaceExponents = field(default_factory=SurfaceExponents)
 
     @property
-    def law(self) -> ReachingLaw:
+    def law(self) -> Law:
         """The reaching law."""
         return self.reaching
 
-    def with_law(self, law: ReachingLaw, log_form: LogForm, exponents: SurfaceExponents) -> TerminalSliding:
+    def with_law(self, law: Law, exponents: SurfaceExponents) -> TerminalSliding:
         """The controller with another law and surface."""
-        return TerminalSliding(law, log_form, exponents)
+        return TerminalSliding(law, exponents)
 
     def control(self, r: Values, y: Values, z: Values, model: ArmModel, p: Values) -> Control:
         """Command, error, sliding variable and the two parts of the command."""
         error = r.q - y.q1
         sigma, surface_rate = surface(error, r.dq - y.dq1, p, self.exponents)
-        rate, a_law = reaching_rate(self.reaching, sigma, p, self.log_form)
+        rate, a_law = reaching_rate(self.reaching, sigma, p)
         wished = slow = slow_control(r.ddq, rate - surface_rate, model(y.q1, y.dq1))
         diagnostics = {SIGMA.name: sigma, U_S.name: slow}
         if "dq2" in y:
@@ -65,4 +64,6 @@ class TerminalSliding(Controller):
         return Control(wished, error, diagnostics=diagnostics, a_law=a_law)
 
 
-CONTROLLERS: dict[str, Controller] = {controller.name: controller for controller in (TerminalSliding(),)}
+CONTROLLERS: Registry[Controller] = Registry(
+    Controller, {item.name: item for item in (TerminalSliding(),)}, check_controller
+)

@@ -11,6 +11,7 @@ believes it to be. All are n x 1, but for M and H (n x n) and the parameters and
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,12 +21,12 @@ from typing import ClassVar
 
 import casadi as ca
 
+from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case
 from springline.model.lagrange import EquationsOfMotion
-from springline.model.mechanism import snake_case
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.perturbation import slow_mass
 from springline.model.quantities import SIGMA, U_WISHED, Quantity
-from springline.model.sliding import LogForm, ReachingLaw, SurfaceExponents
+from springline.model.sliding import Law, SurfaceExponents
 
 States = Mapping[str, ca.SX]
 Rates = States | Callable[[ca.SX], States]
@@ -100,11 +101,11 @@ class Controller(ABC):
         cls.title = vars(cls).get("title", cls.name)
 
     @property
-    def law(self) -> ReachingLaw | None:
+    def law(self) -> Law | None:
         """The reaching law, which a_max limits, of one that has one."""
         return None
 
-    def with_law(self, law: ReachingLaw, log_form: LogForm, exponents: SurfaceExponents) -> Controller:
+    def with_law(self, law: Law, exponents: SurfaceExponents) -> Controller:
         """The controller with the law and the surface that a structure names; without a law it is the same."""
         return self
 
@@ -209,3 +210,21 @@ def commanded(
     ahead = z + h * dz if later is None else stacked("update", later)
     sigma = shown.get(SIGMA.name, ca.SX.zeros(n))
     return ControlSignals(command, wished, parts, error, sigma, a_law, dz, ahead)
+
+
+def check_controller(controller: Controller) -> None:
+    """Raise ValueError, with what was expected, for a controller whose declarations cannot be used."""
+    owner = f"controller {type(controller).__name__}"
+    expect_names(owner, "name", [controller.name])
+    expect_text(owner, "title", controller.title)
+    expect_parameters(owner, "parameters", controller.parameters, ())
+    for what in ("states", "diagnostics"):
+        declared = getattr(controller, what)
+        if not isinstance(declared, tuple) or not all(isinstance(item, Quantity) for item in declared):
+            raise ValueError(f"{owner}: {what}: expected a tuple of Quantity, got {declared!r}")
+        expect_names(owner, what, [item.name for item in declared])
+        for item in declared:
+            for text in (item.unit, item.meaning):
+                expect_text(owner, f"{what}, {item.name}", text)
+            if not math.isfinite(item.initial):
+                raise ValueError(f"{owner}: {what}, {item.name}: expected a finite initial value, got {item.initial!r}")

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from springline.model.base import BaseMotion
+from springline.model.declared import column
 from springline.model.mechanism import Mechanism
 from springline.model.normal_form import collect
 from springline.model.parameters import Values
@@ -39,13 +40,21 @@ class EquationsOfMotion:
 
 
 def equations_of_motion(mechanism: Mechanism, q: ca.SX, dq: ca.SX, base: BaseMotion, p: Values) -> EquationsOfMotion:
-    """Derive (1) from the mechanism's energies; q, dq, and the entries of `base` and `p` are symbols."""
+    """Derive (1) from the mechanism's energies; q, dq, and the entries of `base` and `p` are symbols.
+
+    Raises ValueError for an energy that is no scalar of what it was given, or no quadratic form in the rates.
+    """
     omega, alpha, gravity = (ca.SX.sym(name, 3) for name in ("omega", "alpha", "gravity"))
-    kinetic = mechanism.kinetic_energy(q, dq, omega, p)
-    potential = mechanism.potential_energy(q, gravity, p)
+    owner, known = f"mechanism {mechanism.name}", [q, *p.values()]
+    given = mechanism.kinetic_energy(q, dq, omega, p)
+    kinetic = column(owner, "kinetic_energy", given, 1, [dq, omega, *known])
+    potential = column(owner, "potential_energy", mechanism.potential_energy(q, gravity, p), 1, [gravity, *known])
 
     momentum = ca.gradient(kinetic, dq)
     mass = ca.jacobian(momentum, dq)
+    for symbol, told in ((dq, "the joint rates"), (omega, "the base's rate")):
+        if ca.depends_on(ca.simplify(mass), symbol):
+            raise ValueError(f"{owner}: kinetic_energy: the mass matrix depends on {told}, expected one of q alone")
     moving = (
         ca.jtimes(momentum, q, dq)
         + ca.jtimes(momentum, omega, alpha)

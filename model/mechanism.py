@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,17 +10,13 @@ from typing import ClassVar
 
 import casadi as ca
 
+from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.signals import SineTerm
 
 # Of the critical damping of a motor on its spring: what the fast control adds unless a mechanism says otherwise. It is
 # no small share, for the slow law eats much of it (docs/paper.md, E13).
 _FAST_DAMPING = 0.5
-
-
-def snake_case(name: str) -> str:
-    """A class's name as it is written in a file: "OneLink" is "one_link"."""
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
 
 class Mechanism(ABC):
@@ -95,3 +90,33 @@ class Mechanism(ABC):
             for k, item in enumerate(declared)
             for value in item.defaults(self.joints if item.per_joint else self.joints[k : k + 1])
         ]
+
+
+def check_mechanism(mechanism: Mechanism) -> None:
+    """Raise ValueError, with what was expected, for a mechanism whose declarations do not fit each other."""
+    owner, joints = f"mechanism {type(mechanism).__name__}", getattr(mechanism, "joints", None)
+    if not isinstance(joints, tuple) or not joints or not all(isinstance(joint, Joint) for joint in joints):
+        raise ValueError(f"{owner}: joints: expected a tuple of at least one Joint, got {joints!r}")
+    expect_names(owner, "joints", [joint.name for joint in joints])
+    expect_names(owner, "name", [mechanism.name])
+    for text in (mechanism.source, *(text for joint in joints for text in (joint.unit, joint.force))):
+        expect_text(owner, "units and source", text)
+    names: list[str] = []
+    for what in ("parameters", "motor_inertia", "stiffness"):
+        declared = getattr(mechanism, what, None)
+        expect_parameters(owner, what, declared, () if declared is None else joints)
+        names += [item.name for item in getattr(mechanism, what)]
+    expect_names(owner, "parameters, motor_inertia and stiffness", names)
+    if "g" not in {item.name for item in mechanism.parameters}:
+        raise ValueError(f"{owner}: parameters: expected one called g, the gravity in m/s^2")
+    for what in ("motor_inertia", "stiffness"):
+        declared = getattr(mechanism, what)
+        entries = sum(len(joints) if item.per_joint else 1 for item in declared)
+        if entries != len(joints):
+            raise ValueError(f"{owner}: {what}: expected {len(joints)} numbers, one per joint, got {entries}")
+    for what in ("reference_offset", "start_position", "start_rate", "reference_terms"):
+        found = getattr(mechanism, what)
+        if len(found) != len(joints):
+            raise ValueError(f"{owner}: {what}: expected {len(joints)} entries, one per joint, got {len(found)}")
+        if what != "reference_terms" and not all(math.isfinite(value) for value in found):
+            raise ValueError(f"{owner}: {what}: expected finite numbers, got {found!r}")

@@ -133,7 +133,7 @@ class Values(Mapping[str, ca.SX]):
 
     def __getattr__(self, name: str) -> ca.SX:
         if name.startswith("_") or name not in self._symbols:
-            raise AttributeError(name)
+            raise AttributeError(f"there is no {name!r} here, but {', '.join(self._symbols) or 'nothing'}")
         return self._symbols[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -47,7 +47,7 @@ from springline.model.quantities import (
     entries,
 )
 from springline.model.signals import CONSTANT_ZERO, Signal
-from springline.model.sliding import A_MAX, LAWS, SURFACE_PARAMETERS, LogForm, SurfaceExponents
+from springline.model.sliding import A_MAX, LAWS, SURFACE_PARAMETERS, Law, LogForm, SurfaceExponents
 
 SignalKind = Literal["none", "sine", "polynomial", "table"]
 MotorStart = Literal["unloaded", "equilibrium", "given"]
@@ -114,6 +114,18 @@ def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tu
     return tuple(mechanism.fitted(item) for item in (*seen.values(), *SURFACE_PARAMETERS, *fast, A_MAX, U_MAX))
 
 
+def own_control_tables(structure: Structure) -> dict[str, tuple[Parameter, ...]]:
+    """Tables [control.<name>] of a structure: the parameters of its controller, and of a law that is a user's own."""
+    mechanism, controller = MECHANISMS[structure.mechanism], CONTROLLERS[structure.controller]
+    law = LAWS[structure.law]
+    owners: list[Controller | Law] = [controller] if LAWS.is_packaged(structure.law) else [controller, law]
+    return {
+        item.name: tuple(mechanism.fitted(parameter) for parameter in item.parameters)
+        for item in owners
+        if item.parameters
+    }
+
+
 class System:
     """Symbols, parameter slots and Functions of one structure.
 
@@ -126,9 +138,8 @@ class System:
         self.structure = structure or Structure()
         self.mechanism: Mechanism = MECHANISMS[self.structure.mechanism]
         self.drive: Drive = DRIVES[self.structure.drive]
-        self.controller: Controller = CONTROLLERS[self.structure.controller].with_law(
-            LAWS[self.structure.law], self.structure.log_form, self.structure.exponents
-        )
+        law = LAWS[self.structure.law].with_form(self.structure.log_form)
+        self.controller: Controller = CONTROLLERS[self.structure.controller].with_law(law, self.structure.exponents)
         self.tableau: Tableau = INTEGRATORS[self.structure.integrator]
         self.joints: tuple[Joint, ...] = self.mechanism.joints
         self.n = n = len(self.joints)
@@ -141,8 +152,8 @@ class System:
         self._plant = vector.table("plant", (*arm, *drive), self.joints)
         control_table = control_parameters(self.mechanism, self.structure.drive)
         self._control = vector.table("control", control_table, self.joints)
-        own = tuple(self.mechanism.fitted(item) for item in self.controller.parameters)
-        self._control |= vector.table(f"control.{self.controller.name}", own, self.joints)
+        for table, own in own_control_tables(self.structure).items():
+            self._control |= vector.table(f"control.{table}", own, self.joints)
 
         self.t = ca.SX.sym("t")
         self._d: list[ca.SX] = []
@@ -166,6 +177,15 @@ class System:
         self.u = ca.SX.sym("u", n)
         self.z = ca.SX.sym("z", len(self.memory))
         self.h = ca.SX.sym("h")
+        self._expect_different_names()
+
+    def _expect_different_names(self) -> None:
+        """Raise ValueError where two numbers would have one name in C and in tables."""
+        symbols = [slot.symbol for slot in self.slots]
+        for names in (symbols, [entry.name for entry in self.judged], [entry.name for entry in self.metrics]):
+            twice = [name for name in names if names.count(name) > 1]
+            if twice:
+                raise ValueError(f"mechanism {self.mechanism.name}: two numbers would be called {twice[0]!r}")
 
     # Parameters of signals and start
 
@@ -424,8 +444,8 @@ class System:
                 **function("update", [*ins, self.h], [seen.ahead], [*names, "h"], ["z_next"]),
             }
         if self.controller.law:
-            for law in LAWS.values():
-                rate = law.rate(sigma, self._control, self.structure.log_form)
+            for law in {**LAWS, self.structure.law: self.controller.law}.values():
+                rate = law.with_form(self.structure.log_form).rate(sigma, self._control)
                 result |= function(f"law_{law.name}", [sigma], [rate], ["sigma"], ["dsigma"])
         energy = self._arm_energy() + self.drive.energy(x, self.mechanism, self._plant)
         return {

@@ -13,11 +13,11 @@ from springline.model.base import COORDINATES
 from springline.model.drive import DRIVES, DriveKind
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE
-from springline.model.system import Structure
 from springline.runner import schema
 from springline.runner.errors import InputError, Problem, unknown
 from springline.runner.locate import canonical_path, read_signal_file
 from springline.runner.tables import HALF_TURN, UNITS, Column, Ends, Table, read_table
+from springline.runner.user_code import UserClass, canonical_reference, load_class, read_class
 
 Document = dict[str, dict[str, Any]]
 
@@ -27,8 +27,8 @@ _WHOLE = 1e-9
 
 def resolve(
     raw: Mapping[str, object], where: str, folder: Path, *, read: bool = True
-) -> tuple[Document, tuple[Table, ...], tuple[str, ...]]:
-    """A document with every default filled in, its signal tables, and notes on what was made of them.
+) -> tuple[Document, tuple[Table, ...], tuple[str, ...], tuple[UserClass, ...]]:
+    """A document with every default filled in, its signal tables, notes on what was made of them, and users' classes.
 
     where   what the document came from, for messages
     folder  what relative paths refer to
@@ -44,15 +44,15 @@ def resolve(
         else:
             problems.append(Problem(where, name, "expected a table", schema.given_text(table)))
             given[name] = {}
-    mechanism = given["mechanism"].get("name", Structure().mechanism)
-    if not isinstance(mechanism, str) or mechanism not in MECHANISMS:
-        key, name = "mechanism.name", mechanism if isinstance(mechanism, str) else ""
-        given_name = schema.given_text(mechanism)
-        problems.append(Problem(where, key, "unknown mechanism", given_name, name, tuple(MECHANISMS)))
-        raise InputError(*problems)  # which keys are valid depends on it
-    # Likewise for the drive, whose kind decides what the plant and the controller can be told.
+    code, names = _opened_doors(given, folder, where, problems)
+    mechanism = names["mechanism.name"]
+    # Which keys are valid depends on all that was chosen, and on the drive, whose kind decides what it can be told.
     drive = given["drive"].get("kind", schema.DEFAULT_KINDS["drive"])
-    shape = schema.schema(mechanism, cast(DriveKind, drive if drive in DRIVES else schema.DEFAULT_KINDS["drive"]))
+    drive = cast(DriveKind, drive if drive in DRIVES else schema.DEFAULT_KINDS["drive"])
+    try:
+        shape = schema.schema(mechanism, drive, names["control.controller"], names["control.law"])
+    except ValueError as error:
+        raise InputError(*problems, Problem(where, "control", str(error))) from error
 
     # Tables and keys that are wrong are left out of the document; the checks below skip what is not there.
     document: Document = {}
@@ -97,7 +97,37 @@ def resolve(
             problems += error.problems
     if problems:
         raise InputError(*problems)
-    return document, tuple(tables), tuple(notes)
+    return document, tuple(tables), tuple(notes), code
+
+
+def _opened_doors(
+    given: dict[str, dict[str, Any]], folder: Path, where: str, problems: list[Problem]
+) -> tuple[tuple[UserClass, ...], dict[str, str]]:
+    """The classes of users' files that a document names, and what each door's key is registered as.
+
+    `given` gets canonical references. A name that is none gets into `problems`, and the default stands for it.
+    Raises InputError for a mechanism or a file that cannot be had, for which keys are valid depends on it.
+    """
+    code: list[UserClass] = []
+    names: dict[str, str] = {}
+    for (table, name), (registry, default) in schema.DOORS.items():
+        key, value = f"{table}.{name}", given[table].get(name, default)
+        if schema.names_file(value):
+            reference = canonical_reference(value, folder, where, key)
+            user = read_class(reference, where, key)
+            load_class(user, registry, where, key)
+            given[table] = {**given[table], name: reference}
+            code.append(user)
+            names[key] = user.key
+        elif isinstance(value, str) and registry.is_packaged(value):
+            names[key] = value
+        elif table == "mechanism":
+            given_name = value if isinstance(value, str) else ""
+            text = schema.given_text(value)
+            raise InputError(*problems, Problem(where, key, "unknown mechanism", text, given_name, tuple(registry)))
+        else:
+            names[key] = default  # the table's own check says what is wrong
+    return tuple(code), names
 
 
 def _section_of_kind(

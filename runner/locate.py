@@ -147,6 +147,11 @@ def file_text(path: Path) -> str:
     return _contents(path, _LARGEST_SCENARIO).decode("utf-8-sig")
 
 
+def file_bytes(path: Path) -> bytes:
+    """Contents of a file of a user's code. Raises OSError and ValueError for what cannot be one."""
+    return _contents(path, _LARGEST_SCENARIO)
+
+
 def reason(error: Exception) -> object:
     """What the system says of a failure, without the path."""
     return error.strerror if isinstance(error, OSError) and error.strerror else error

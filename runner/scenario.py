@@ -15,12 +15,15 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from springline.codegen import lanes
 from springline.codegen.numbers import doubles
+from springline.codegen.program import program
 from springline.model.base import COORDINATES
+from springline.model.control import CONTROLLERS
 from springline.model.drive import DRIVES, DriveKind
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE, Bounds
-from springline.model.sliding import LogForm, SurfaceExponents
+from springline.model.sliding import LAWS, LogForm, SurfaceExponents
 from springline.model.system import MotorStart, SignalKind, SignalShape, Structure, System
 from springline.runner import schema
 from springline.runner.checking import Document, resolve
@@ -29,10 +32,13 @@ from springline.runner.errors import InputError, Problem, shortened, unknown
 from springline.runner.locate import expect_kind, packaged_scenarios, read_scenario, relative_path
 from springline.runner.tables import Table
 from springline.runner.toml_text import document_text, read_toml
+from springline.runner.user_code import UserClass, canonical_reference, load_class, read_class, told
 
 __all__ = ["NumericKey", "Scenario", "expect_scenario", "load_scenario", "packaged_scenarios", "parse_set"]
 
 Floats = NDArray[np.float64]
+# Relative to the largest eigenvalue: a mass matrix below this is singular to the precision of what is computed with it.
+_SINGULAR = 1e-12
 _BARE_WORD = re.compile(r"([^\W\d]|\.{0,2}/)[\w.:/+-]*")
 
 Slots = dict[str, float | Floats]
@@ -63,6 +69,7 @@ class Scenario:
     document       its tables as plain data; read it, do not change it
     signal_tables  its signals from CSV files, in the order of System.tables
     notes          what was made of the CSV files, a sentence each, for people
+    code           classes of users' files that it names
     """
 
     source: str
@@ -70,6 +77,7 @@ class Scenario:
     document: Document
     signal_tables: tuple[Table, ...]
     notes: tuple[str, ...] = ()
+    code: tuple[UserClass, ...] = ()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scenario) and self._identity == other._identity
@@ -79,7 +87,7 @@ class Scenario:
 
     @cached_property
     def _identity(self) -> tuple[str, tuple[Table, ...]]:
-        return document_text(_with_paths(self.document, lambda path: "")), self.signal_tables
+        return document_text(_with_paths(self.document, lambda path: "", self.registered)), self.signal_tables
 
     # What the loop is told
 
@@ -140,15 +148,20 @@ class Scenario:
 
     # What the model is told
 
+    def registered(self, name: str) -> str:
+        """What a mechanism, controller or law that the document names is registered as."""
+        return next((user.key for user in self.code if user.reference == name), name)
+
     def structure(self) -> Structure:
         """Everything about the scenario that is no number."""
         control, initial = self.document["control"], self.document["initial"]
         motor = initial.get("q_motor", "unloaded")
-        mechanism = self.document["mechanism"]["name"]
+        mechanism = self.registered(self.document["mechanism"]["name"])
         joints = [joint.name for joint in MECHANISMS[mechanism].joints]
         return Structure(
             mechanism=mechanism,
-            law=control["law"],
+            law=self.registered(control["law"]),
+            controller=self.registered(control["controller"]),
             log_form=cast(LogForm, control["log_form"]),
             exponents=SurfaceExponents(**{name: control[name] for name in ("l", "m", "p", "r")}),
             reference=_shape(self.document["reference"], joints),
@@ -278,9 +291,8 @@ class Scenario:
             return self
         document = self._without_excluded(overrides)
         problems = []
-        mechanism = overrides.get("mechanism.name", self.document["mechanism"]["name"])
-        joints = len(MECHANISMS[str(mechanism)].joints) if mechanism in MECHANISMS else 1
         where = _overridden(self.source)
+        joints = self._joints_with(overrides, where)
         for key, value in overrides.items():
             try:
                 document = replaced(document, key.split("."), plain(value), joints)
@@ -290,7 +302,36 @@ class Scenario:
                 problems.append(Problem(where, key, f"expected a value that TOML can hold: {error}"))
         if problems:
             raise InputError(*problems)
-        return Scenario(self.source, self.folder, *resolve(document, where, self.folder, read=read))
+        changed = Scenario(self.source, self.folder, *resolve(document, where, self.folder, read=read))
+        if read:
+            changed.expect_computable(where)
+        return changed
+
+    def expect_computable(self, where: str) -> None:
+        """Build what users' classes describe, so that what is wrong with them is told before anything else is done.
+
+        where  what the scenario came from, for messages
+        Raises InputError.
+        """
+        for user in self.code:
+            with told(user, where, ""):
+                _expect_printable(self.structure())
+            if user.reference == self.document["mechanism"]["name"] and self.structure().start == "given":
+                mass = np.array(self.system().function("mass_matrix")(self.document["initial"]["q"], self.values()))
+                sizes = np.linalg.eigvalsh(mass) if np.isfinite(mass).all() else np.array([np.nan])
+                if not sizes[0] > _SINGULAR * sizes[-1]:
+                    text = "the mass matrix at the start is not positive definite, its least eigenvalue is"
+                    raise InputError(Problem(where, "mechanism.name", f"{user}: {text} {sizes[0]:.3g}"))
+
+    def _joints_with(self, overrides: Mapping[str, object], where: str) -> int:
+        """How many joints there are with these overrides; 1 for a mechanism that is unknown, which is told later."""
+        given = overrides.get("mechanism.name")
+        if schema.names_file(given):
+            reference = canonical_reference(str(given), self.folder, where, "mechanism.name")
+            user = read_class(reference, where, "mechanism.name")
+            return len(load_class(user, MECHANISMS, where, "mechanism.name").joints)
+        name = self.registered(self.document["mechanism"]["name"]) if given is None else str(given)
+        return len(MECHANISMS[name].joints) if name in MECHANISMS else 1
 
     def _without_excluded(self, overrides: Mapping[str, object]) -> Document:
         """A copy of the document without what the overrides exclude."""
@@ -301,14 +342,19 @@ class Scenario:
                 document[table] = {"kind": kind}
         if overrides.get("control.mode") == "continuous":
             document["control"].pop("period", None)
+        for name, registry in (("controller", CONTROLLERS), ("law", LAWS)):
+            old = document["control"][name]
+            if overrides.get(f"control.{name}", old) != old:
+                document["control"].pop(registry[self.registered(old)].name, None)
         mechanism = document["mechanism"]["name"]
         drive = overrides.get("drive.kind", document["drive"]["kind"])
         if overrides.get("mechanism.name", mechanism) != mechanism:
-            control = {k: v for k, v in document["control"].items() if not isinstance(v, list)}
+            control = {k: _without_lists(v) for k, v in document["control"].items() if not isinstance(v, list)}
             document = {name: document[name] for name in ("base_motion", "simulation")} | {"control": control}
             document["drive"] = {"kind": drive}
         elif drive in DRIVES and drive != document["drive"]["kind"]:
-            shape = schema.schema(mechanism, cast(DriveKind, drive))
+            structure = self.structure()
+            shape = schema.schema(structure.mechanism, cast(DriveKind, drive), structure.controller, structure.law)
             sections = {name: shape.sections[name] for name in ("plant", "control", "initial")}
             for name, section in (sections | {"drive": shape.kinds["drive"][str(drive)]}).items():
                 document[name] = {k: v for k, v in document[name].items() if k in section.model_fields}
@@ -329,7 +375,10 @@ class Scenario:
         """
         if folder is None:
             return document_text(self.document)
-        return document_text(_with_paths(self.document, lambda path: relative_path(path, folder)))
+        moved = {user.reference: user.reference_from(folder) for user in self.code}
+        return document_text(
+            _with_paths(self.document, lambda path: relative_path(path, folder), lambda name: moved.get(name, name))
+        )
 
 
 def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
@@ -362,7 +411,10 @@ def _loaded(source: str | Path, *, read: bool) -> Scenario:
     except ValueError as error:
         raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
     expect_kind("scenario", source, document)
-    return Scenario(name, Path(), *resolve(document, name, folder, read=read))
+    scenario = Scenario(name, Path(), *resolve(document, name, folder, read=read))
+    if read:
+        scenario.expect_computable(name)
+    return scenario
 
 
 def _expect_name(given: object) -> None:
@@ -452,11 +504,25 @@ def _is_idle(key: str, structure: Structure) -> bool:
     return key.startswith("initial.q_motor.") and structure.initial_motor != "given"
 
 
-def _with_paths(document: Document, moved: Callable[[str], str]) -> Document:
-    """A document whose signal tables name other paths."""
-    return {
+def _with_paths(document: Document, moved: Callable[[str], str], named: Callable[[str], str]) -> Document:
+    """A document whose signal tables name other paths, and whose doors other classes."""
+    result = {
         name: table | {"path": moved(table["path"])} if "path" in table else table for name, table in document.items()
     }
+    for table, key in schema.DOORS:
+        result[table] = {**result[table], key: named(result[table][key])}
+    return result
+
+
+def _without_lists(value: object) -> object:
+    """A table without what there is one of for each joint; anything else as it is."""
+    return {k: v for k, v in value.items() if not isinstance(v, list)} if isinstance(value, dict) else value
+
+
+@lru_cache(maxsize=64)
+def _expect_printable(structure: Structure) -> None:
+    """Raise UnprintableOperation, or whatever a user's class raises, for a structure that no kernel can be made of."""
+    lanes.emit(program(structure), {}, 1)
 
 
 def _shape(table: Mapping[str, Any], coordinates: Sequence[str]) -> SignalShape:

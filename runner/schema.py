@@ -16,13 +16,15 @@ from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_sc
 from springline.codegen.kernel import MOST_STEPS
 from springline.codegen.numbers import double
 from springline.model.base import COORDINATES
+from springline.model.control import CONTROLLERS
 from springline.model.drive import DRIVES, EPSILON, DriveKind
 from springline.model.integrators import INTEGRATORS
 from springline.model.mechanism import Mechanism
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
+from springline.model.registry import Registry
 from springline.model.sliding import LARGEST_SURFACE_EXPONENT, LAWS, LogForm
-from springline.model.system import Structure, control_parameters
+from springline.model.system import Structure, control_parameters, own_control_tables
 from springline.runner.errors import Problem, unknown
 from springline.runner.tables import ENDS, UNITS
 from springline.runner.toml_text import value_text
@@ -162,6 +164,21 @@ def choice(kind: str, names: Iterable[str]) -> Leaf:
     return Leaf(" or ".join(f'"{name}"' for name in names), check)
 
 
+def names_file(text: object) -> bool:
+    """Whether a name in a scenario means a class of a user's file: "my_arm.py:MyArm"."""
+    return isinstance(text, str) and (".py:" in text or text.endswith(".py"))
+
+
+def door(kind: str, registry: Registry[Any]) -> Leaf:
+    """One of those that come with springline, or a class of a user's file; `kind` says what they name."""
+    packaged = choice(kind, registry)
+
+    def check(value: object) -> str:
+        return str(value) if names_file(value) else str(packaged.check(value))
+
+    return Leaf(f'{packaged.expected} or "FILE.py:CLASS"', check)
+
+
 def several(item: Leaf) -> Leaf:
     """A list of at least one."""
     expected = f"a list, not empty, each {item.expected}"
@@ -204,7 +221,8 @@ _EXPONENT = whole(LARGEST_SURFACE_EXPONENT, odd=True)
 class ControlStructure(Section):
     """The keys of [control] that are no numbers of the model."""
 
-    law: Annotated[str, choice("law", tuple(LAWS))] = _DEFAULT.law
+    controller: Annotated[str, door("controller", CONTROLLERS)] = _DEFAULT.controller
+    law: Annotated[str, door("law", LAWS)] = _DEFAULT.law
     log_form: Annotated[str, choice("log_form", get_args(LogForm))] = _DEFAULT.log_form
     l: Annotated[int, _EXPONENT] = _DEFAULT.exponents.l  # noqa: E741 - the paper's letter
     m: Annotated[int, _EXPONENT] = _DEFAULT.exponents.m
@@ -259,13 +277,29 @@ DEFAULT_KINDS = {"drive": "elastic", "reference": "sine", "base_motion": "none"}
 """Table -> the kind that it has where none is given."""
 
 
+DOORS: Mapping[tuple[str, str], tuple[Registry[Any], str]] = {
+    ("mechanism", "name"): (MECHANISMS, _DEFAULT.mechanism),
+    ("control", "controller"): (CONTROLLERS, _DEFAULT.controller),
+    ("control", "law"): (LAWS, _DEFAULT.law),
+}
+"""Table and key that may name a class of a user's file -> what else it may name, and what it is by default."""
+
+
 @lru_cache
-def schema(name: str, drive: DriveKind) -> Schema:
-    """The schema for the mechanism `name` and a kind of drive."""
+def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, law: str = _DEFAULT.law) -> Schema:
+    """The schema for the mechanism, kind of drive, controller and law that are registered as such.
+
+    Raises ValueError for a controller or law whose table [control.<its name>] would be a key that there is already.
+    """
     mechanism = MECHANISMS[name]
     joints = mechanism.joints
     arm, moving = mechanism.parameters, DRIVES[drive].parameters(mechanism)
-    named = (Annotated[str, choice("mechanism", MECHANISMS)], name)
+    named = (Annotated[str, door("mechanism", MECHANISMS)], name)
+    shared = _numbers(control_parameters(mechanism, drive), joints)
+    own = own_control_tables(Structure(name, law, drive=drive, controller=controller))
+    for taken in own:
+        if taken in shared or taken in ControlStructure.model_fields:
+            raise ValueError(f"{taken!r} is a key of [control] already: give the class another name")
     position, rate = (_each("{q}", REAL, joints), _each("{q}/s", REAL, joints))
     initial = {
         "q": (Annotated[Any, position], list(mechanism.start_position)),
@@ -281,7 +315,7 @@ def schema(name: str, drive: DriveKind) -> Schema:
         sections={
             "mechanism": _section("mechanism", {"name": named, **_numbers(arm, joints)}),
             "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *moving)}),
-            "control": _section("control", _numbers(control_parameters(mechanism, drive), joints), ControlStructure),
+            "control": _section("control", shared | _own_tables(own, joints), ControlStructure),
             "initial": _section("initial", initial),
             "simulation": Simulation,
         },
@@ -299,6 +333,12 @@ def schema(name: str, drive: DriveKind) -> Schema:
             },
         },
     )
+
+
+def _own_tables(own: Mapping[str, Iterable[Parameter]], joints: Sequence[Joint]) -> dict[str, Any]:
+    """Fields of the tables [control.<name>]."""
+    sections = {name: _section(name, _numbers(parameters, joints)) for name, parameters in own.items()}
+    return {name: (made, made.model_validate({})) for name, made in sections.items()}
 
 
 def _drive_section(kind: str, mechanism: Mechanism) -> type[Section]:

@@ -1,8 +1,11 @@
-"""Mechanisms by name. A new one is one module with two energies and one line here."""
+"""Mechanisms by name. A new one is one module with two energies and one line here, or a user's own file."""
 
 from __future__ import annotations
 
-from springline.model.mechanism import Mechanism
+from springline.model.mechanism import Mechanism, check_mechanism
 from springline.model.mechanisms.transfer_manipulator import TransferManipulator
+from springline.model.registry import Registry
 
-MECHANISMS: dict[str, Mechanism] = {mechanism.name: mechanism for mechanism in (TransferManipulator(),)}
+MECHANISMS: Registry[Mechanism] = Registry(
+    Mechanism, {item.name: item for item in (TransferManipulator(),)}, check_mechanism
+)

@@ -8,7 +8,7 @@ import pkgutil
 import pytest
 
 from springline.model.mechanism import Mechanism
-from springline.model.sliding import ReachingLaw
+from springline.model.sliding import Law
 
 PACKAGES = ("springline.model", "springline.codegen", "springline.runner")
 
@@ -50,7 +50,7 @@ def undocumented_members(cls):
 
 def protocol_members(cls):
     """Methods that a documented Protocol of springline.model describes for the classes that fulfil it."""
-    for protocol in (Mechanism, ReachingLaw):
+    for protocol in (Mechanism, Law):
         names = [key for key, value in vars(protocol).items() if inspect.isfunction(value) and key[0] != "_"]
         if all(hasattr(cls, key) for key in names):
             yield from names

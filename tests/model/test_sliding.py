@@ -12,7 +12,7 @@ from springline.model.controller import ArmModel
 from springline.model.drive import DRIVES
 from springline.model.lagrange import equations_of_motion
 from springline.model.parameters import Values
-from springline.model.sliding import LAWS, SurfaceExponents, reaching_rate, surface
+from springline.model.sliding import LAWS, Law, SurfaceExponents, reaching_rate, surface
 from springline.model.system import Structure, System
 
 EXPONENTS = [(3, 1, 1, 3), (5, 3, 3, 5), (7, 5, 5, 7), (5, 1, 1, 5), (7, 3, 5, 9), (9, 7, 1, 9), (5, 3, 1, 11)]
@@ -160,7 +160,7 @@ def test_variable_power_is_continuous_with_a_kink():
 def isolated_law(name, values):
     sigma = ca.SX.sym("sigma")
     p = Values({key: ca.SX(value) for key, value in values.items()})
-    return ca.Function("law", [sigma], [LAWS[name].rate(sigma, p, "power")])
+    return ca.Function("law", [sigma], [LAWS[name].rate(sigma, p)])
 
 
 @pytest.mark.parametrize("law", LAW_NAMES)
@@ -230,7 +230,7 @@ def test_a_max_limits_the_sum_of_the_law_only():
     """E4: per joint, on the law's sum, before the surface's own derivative is subtracted."""
     sigma = ca.SX.sym("sigma", 2)
     p = Values({**{k: ca.SX(v) for k, v in TABLE_3.items()}, "a_max": ca.SX([200.0, math.inf])})
-    f = ca.Function("rate", [sigma], [reaching_rate(LAWS["variable_power_log"], sigma, p, "power")[0]])
+    f = ca.Function("rate", [sigma], [reaching_rate(LAWS["variable_power_log"], sigma, p)[0]])
     lift, rotation = np.array(f([-7.64, -7.64])).reshape(-1)
     assert lift == 200.0
     assert rotation == pytest.approx(3.5e6, rel=0.1)
@@ -263,7 +263,7 @@ def test_infinite_limits_are_no_limits(model, rng):
 # --- the linearised loop of E3 ---------------------------------------------------------------------------
 
 
-class Linear:
+class Linear(Law):
     """d sigma/dt = -s sigma: the reaching law as it looks near the surface."""
 
     name, title, parameters = "linear", "linear", ()
@@ -271,7 +271,7 @@ class Linear:
     def __init__(self, slope):
         self.slope = slope
 
-    def rate(self, sigma, p, log_form):
+    def rate(self, sigma, p):
         return -self.slope * sigma
 
 

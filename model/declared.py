@@ -1,0 +1,70 @@
+"""What a class of a mechanism, law or controller declares, and whether names and comments of C can be made of it.
+
+Each function raises ValueError, with the class's name and what was expected, for what cannot.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+import casadi as ca
+
+from springline.model.parameters import Joint, Parameter
+
+_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def snake_case(name: str) -> str:
+    """A class's name as it is written in a file: "OneLink" is "one_link"."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def expect_names(owner: str, what: str, names: Sequence[object]) -> None:
+    """Names that are parts of names in C: ASCII letters, digits and underscores after a letter, each only once."""
+    for name in names:
+        if not isinstance(name, str) or not _IDENTIFIER.fullmatch(name):
+            raise ValueError(f"{owner}: {what}: expected a letter, then letters, digits and underscores, got {name!r}")
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise ValueError(f"{owner}: {what}: {twice[0]!r} is there twice")
+
+
+def expect_text(owner: str, what: str, text: object) -> None:
+    """A line that a comment in C can hold."""
+    if not isinstance(text, str) or not text.isprintable() or "*/" in text or "/*" in text or text.endswith("\\"):
+        raise ValueError(f"{owner}: {what}: expected a line of text without /* and */, got {text!r}")
+
+
+def expect_parameters(owner: str, what: str, parameters: object, joints: Sequence[Joint]) -> None:
+    """A tuple of Parameters with different names and admissible defaults."""
+    if not isinstance(parameters, tuple) or not all(isinstance(item, Parameter) for item in parameters):
+        raise ValueError(f"{owner}: {what}: expected a tuple of Parameter, got {parameters!r}")
+    expect_names(owner, what, [item.name for item in parameters])
+    for item in parameters:
+        for text in (item.unit, item.meaning):
+            expect_text(owner, f"{what}, {item.name}", text)
+        for value in item.defaults(joints) if joints or not item.per_joint else ():
+            if isinstance(value, bool) or not isinstance(value, int | float) or not item.bounds.holds(value):
+                raise ValueError(f"{owner}: {what}, {item.name}: expected as default {item.bounds}, got {value!r}")
+
+
+def column(owner: str, what: str, value: object, rows: int, symbols: Iterable[ca.SX]) -> ca.SX:
+    """An expression of `rows` entries that depends on `symbols` alone."""
+    if not isinstance(value, ca.SX | ca.DM | int | float):
+        raise ValueError(f"{owner}: {what}: expected a CasADi SX expression, got {type(value).__name__}")
+    made: ca.SX = ca.SX(value)
+    if made.shape != (rows, 1):
+        shape = "a scalar" if rows == 1 else f"{rows} x 1"
+        raise ValueError(f"{owner}: {what}: expected {shape}, got {made.shape[0]} x {made.shape[1]}")
+    known = {hash_of(item) for symbol in symbols for item in ca.symvar(symbol)}
+    foreign = [item.name() for item in ca.symvar(made) if hash_of(item) not in known]
+    if foreign:
+        raise ValueError(f"{owner}: {what}: depends on {foreign[0]!r}, which it was not given")
+    return made
+
+
+def hash_of(symbol: ca.SX) -> int:
+    """What tells two symbols of one name apart."""
+    return int(symbol.element_hash())
