@@ -166,34 +166,50 @@ _LAYOUT = (
 )
 
 
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What there is of everything that a loop takes and gives: all that a compiled one need know of its System.
+
+    columns  of a trajectory;  tables: the signal tables that it reads
+    """
+
+    joints: int
+    states: int
+    columns: int
+    tables: tuple[TableLayout, ...]
+
+    @classmethod
+    def of(cls, system: System) -> Shape:
+        """The Shape of a System's loop."""
+        return cls(system.n, system.x.numel() + system.z.numel(), len(system.trajectory), system.tables)
+
+
 class Kernel:
     """The compiled loop of one Program.
 
-    program     what it was printed from
+    shape       of what it was printed from
     parameters  slot keys in the order of the columns that `run` takes
     width       runs that are simulated together (lanes x groups x packs)
     library     the shared library, in the cache
     Raises LayoutError if the C does not have the sizes that this file reads and writes, ToolchainError.
     """
 
-    def __init__(self, program: Program, source: KernelSource, compiler: toolchain.Compiler | None = None) -> None:
-        self.program = program
+    def __init__(self, shape: Shape, source: KernelSource, compiler: toolchain.Compiler | None = None) -> None:
+        self.shape = shape
         self.parameters = source.parameters
         self.library = toolchain.build_library(dict(source.files), main="loop.c", flags=source.flags, compiler=compiler)
         handle = toolchain.load(self.library)
         self._simulate: Any = handle.springline_simulate
         self._simulate.restype = None
-        system = program.system
-        self._states, self._columns = system.x.numel() + system.z.numel(), len(system.trajectory)
         self.width = _checked_layout(
             handle.springline_layout,
             ctypes.sizeof(Job),
             ctypes.sizeof(_Table),
             len(self.parameters),
-            len(system.tables),
-            self._states,
-            len(system.metrics),
-            self._columns,
+            len(shape.tables),
+            shape.states,
+            shape.joints * len(METRICS),
+            shape.columns,
             len(STATUS),
         )
 
@@ -214,7 +230,7 @@ class Kernel:
         runs = len(parameters) if parameters.ndim else 0
         if parameters.shape != (runs, len(self.parameters)):
             raise ValueError(f"parameters have shape {parameters.shape}, expected (runs, {len(self.parameters)})")
-        layouts: Sequence[TableLayout] = self.program.system.tables
+        layouts = self.shape.tables
         if len(tables) != len(layouts):
             raise ValueError(f"{len(tables)} tables given, the system has {len(layouts)}")
         c_tables = (_Table * max(len(tables), 1))()
@@ -234,19 +250,19 @@ class Kernel:
                 coefficients=data.ctypes.data,
             )
         rows = settings.rows
-        needed, there = 8 * runs * rows * self._columns, memory()
+        needed, there = 8 * runs * rows * self.shape.columns, memory()
         if needed > there:
             raise ValueError(
-                f"output_every is {settings.output_every}: {runs} x {rows} trajectory rows of {self._columns} numbers "
-                f"need {needed / 1e9:.3g} GB of memory, and there are {there / 1e9:.3g}"
+                f"output_every is {settings.output_every}: {runs} x {rows} trajectory rows of {self.shape.columns} "
+                f"numbers need {needed / 1e9:.3g} GB of memory, and there are {there / 1e9:.3g}"
             )
         result = Runs(
-            metrics=np.full((runs, self.program.system.n, len(METRICS)), np.nan),
-            final_state=np.zeros((runs, self._states)),
+            metrics=np.full((runs, self.shape.joints, len(METRICS)), np.nan),
+            final_state=np.zeros((runs, self.shape.states)),
             end_time=np.zeros(runs),
             status=np.zeros(runs, np.int32),
             quantity=np.full(runs, -1, np.int32),
-            trajectory=np.full((runs, rows, self._columns), np.nan) if rows else None,
+            trajectory=np.full((runs, rows, self.shape.columns), np.nan) if rows else None,
             rows=np.zeros(runs, np.int64) if rows else None,
         )
         job = Job(
@@ -312,7 +328,7 @@ def quantity_name(system: System, quantity: int) -> str:
 
 def compile_kernel(program: Program, spec: KernelSpec) -> Kernel:
     """Print and compile the Kernel of a Program; see `print_kernel`. Raises ToolchainError."""
-    return Kernel(program, print_kernel(program, spec), spec.options.compiler)
+    return Kernel(Shape.of(program.system), print_kernel(program, spec), spec.options.compiler)
 
 
 @lru_cache(maxsize=64)

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,10 +26,11 @@ from springline.runner.errors import InputError, Problem, unknown
 from springline.runner.records import FOLDER as TABLES
 from springline.runner.records import Record, portable_text, records
 from springline.runner.scenario import NumericKey, Scenario
-from springline.runner.schema import given_text, number_text
+from springline.runner.schema import DOORS, given_text, names_file, number_text
 from springline.runner.simulate import field, metrics_schema, metrics_table, trajectory_schema
 from springline.runner.sweep import Axis, Sweep
 from springline.runner.toml_text import value_text
+from springline.runner.user_code import UserClass, canonical_reference
 from springline.runner.work import Outcome, Work, work_for
 
 Floats = NDArray[np.float64]
@@ -38,8 +40,8 @@ MOST_GROUPS = 256
 MOST_PARTS = 1_000_000
 """As many as the six digits of their names tell apart; a folder of more is slow everywhere."""
 
-FORMAT = 2
-"""Of datasets: what their description says and how their parts are sealed. 1 said nothing of a format."""
+FORMAT = 3
+"""Of datasets: what is described, how parts are sealed. 1 said nothing of a format, 2 nothing of code."""
 
 # A chunk is what a kill loses and what a thread takes at a time. Of a large sweep it is some seconds of work, but no
 # more runs than keep memory flat; of a small one it is enough to make the milliseconds of drawing and storing it not
@@ -232,13 +234,15 @@ class Plan:
     def as_json(self) -> dict[str, Any]:
         """All that decides the dataset, as plain data: two plans with the same description give the same tables."""
         names = {kept.record: name for name, kept in self.tables.items()}
+        classes = {user.reference: name for name, (user, _) in self.code.items()}
         paths = {r.section: f"{TABLES}/{names[r]}" for r in self._records(self.sweep.scenario)}
         return {
             "format": FORMAT,
             "sampler": sampling.VERSION,
             "sweep": self.sweep.as_json(),
-            "scenario": portable_text(self.sweep.scenario, paths),
+            "scenario": portable_text(self.sweep.scenario, paths, classes),
             "tables": {name: {"sha256": k.record.sha256, "paths": list(k.paths)} for name, k in self.tables.items()},
+            "code": {name: {"sha256": user.hash, "names": given} for name, (user, given) in self.code.items()},
             "groups": [
                 {
                     "constants": group.constants,
@@ -265,6 +269,32 @@ class Plan:
                 _, paths = found.setdefault(record, (name, []))
                 paths += [str(constants[key]) for key in (f"{record.section}.path",) if key in constants]
         return {name: Kept(record, tuple(dict.fromkeys(paths))) for record, (name, paths) in found.items()}
+
+    @cached_property
+    def code(self) -> dict[str, tuple[UserClass, list[str]]]:
+        """The classes of users' files that the runs need, by the name that each gets in the dataset: "my_arm.py:MyArm".
+
+        Beside it what names it in the values of a key that varies.
+        """
+        found: dict[str, tuple[UserClass, list[str]]] = {}
+        keys = [f"{table}.{key}" for table, key in DOORS]
+        for scenario, constants in ((self.sweep.scenario, {}), *((g.scenario, g.constants) for g in self.groups)):
+            for user in scenario.code:
+                stem, earlier = Path(user.path).stem, 1
+                name = f"{stem}.py:{user.name}"
+                while name in found and found[name][0].key != user.key:
+                    earlier += 1
+                    name = f"{stem}-{earlier}.py:{user.name}"
+                _, given = found.setdefault(name, (user, []))
+                named = [str(constants[key]) for key in keys if constants.get(key) is not None]
+                given += [
+                    text
+                    for text in named
+                    if names_file(text)
+                    and text not in given
+                    and canonical_reference(text, scenario.folder, scenario.source, "") == user.reference
+                ]
+        return found
 
     def _records(self, scenario: Scenario) -> list[Record]:
         """The files of a scenario; groups share scenarios, and each is read once."""

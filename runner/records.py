@@ -1,6 +1,7 @@
 """The CSV files that the runs of a scenario read, and the scenario as it reads wherever they lie beside it.
 
-A dataset, and the folder of a replayed run, keep these files, so that neither depends on where the originals were.
+A dataset, and the folder of a replayed run, keep these files, so that neither depends on where the originals were. Code
+they do not keep, for what lies in a folder of results must not run by itself: they name it, with its hash.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from hashlib import sha256
 
 from springline.runner.locate import canonical_path, read_signal_file
 from springline.runner.scenario import Scenario
+from springline.runner.schema import DOORS
 from springline.runner.toml_text import document_text
 
 FOLDER = "tables"
@@ -46,10 +48,15 @@ def path_keys() -> tuple[str, ...]:
     return tuple(f"{name}.path" for name in _SECTIONS)
 
 
-def portable_text(scenario: Scenario, paths: Mapping[str, str]) -> str:
-    """The complete scenario as TOML, with other paths to its files: table of the scenario -> path."""
-    moved = {name: {**table, "path": paths[name]} for name, table in _reading(scenario)}
-    return document_text({**scenario.document, **moved})
+def portable_text(scenario: Scenario, paths: Mapping[str, str], names: Mapping[str, str]) -> str:
+    """The complete scenario as TOML, with other paths to its files.
+
+    paths  table of the scenario -> path of its CSV file;  names: reference to a user's class -> how it is named
+    """
+    document = {**scenario.document, **{name: {**table, "path": paths[name]} for name, table in _reading(scenario)}}
+    for table, key in DOORS:
+        document[table] = {**document[table], key: names.get(document[table][key], document[table][key])}
+    return document_text(document)
 
 
 def _reading(scenario: Scenario) -> list[tuple[str, Mapping[str, str]]]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -17,14 +20,18 @@ from springline.runner.plan import Plan
 from springline.runner.records import FOLDER as TABLES
 from springline.runner.records import path_keys, portable_text, records
 from springline.runner.scenario import Scenario
+from springline.runner.schema import DOORS, names_file
 from springline.runner.sweep import Axis, sweep_from_json
 from springline.runner.toml_text import read_toml
+from springline.runner.user_code import UserClass, read_class
 
 
-def stored_plan(dataset: Dataset) -> Plan:
+def stored_plan(dataset: Dataset, code: Sequence[Path] = ()) -> Plan:
     """The plan that a dataset was made by, from its sweep.json and the signal tables that it keeps.
 
-    Raises InputError if it cannot be read any more, was made by another version's rules, or a table is damaged.
+    code  the users' files that it needs: a dataset only names them, with their hashes
+    Raises InputError if it cannot be read any more, was made by another version's rules, or a table is damaged; for a
+    file that it needs and was not given, and one that is not the one that it needs.
     """
     stored = dataset.description()
     dataset.expect_format(stored)
@@ -35,9 +42,11 @@ def stored_plan(dataset: Dataset) -> Plan:
     try:
         for file, entry in stored["tables"].items():
             _expect_table(dataset, file, entry["sha256"])
-        scenario = _scenario(dataset, stored["scenario"])
+        classes = _classes(name, stored["code"], code)
+        scenario = _scenario(dataset, stored["scenario"], {key: user.reference for key, (user, _) in classes.items()})
         sweep = sweep_from_json(stored["sweep"], stored["chunk"], scenario, f"{name}/sweep.json")
         kept = {path: f"{TABLES}/{file}" for file, entry in stored["tables"].items() for path in entry["paths"]}
+        kept |= {text: user.reference for user, given in classes.values() for text in given}
         plan = Plan(replace(sweep, source=name, axes=tuple(_found(axis, kept) for axis in sweep.axes)))
         told = [stored["runs"], stored["chunks"], [[group["first"], group["runs"]] for group in stored["groups"]]]
         if canonical_json(told) != canonical_json([plan.runs, plan.chunks, [[g.first, g.runs] for g in plan.groups]]):
@@ -60,15 +69,52 @@ def _expect_table(dataset: Dataset, file: str, digest: str) -> None:
         raise InputError(Problem(f"{dataset.place.name}/{TABLES}/{file}", "", text))
 
 
-def _scenario(dataset: Dataset, text: str) -> Scenario:
-    """The scenario of a text, whose tables the dataset keeps."""
+def _classes(
+    dataset: str, needed: Mapping[str, Mapping[str, Any]], code: Sequence[Path]
+) -> dict[str, tuple[UserClass, list[str]]]:
+    """The classes that a dataset's runs need, out of the files that were given, as Plan.code has them."""
+    found, problems = {}, []
+    given = {Path(os.path.realpath(file)): file for file in code}
+    used: set[Path] = set()
+    for reference, entry in needed.items():
+        file, _, name = reference.rpartition(":")
+        hashes: dict[Path, str] = {}
+        for path, written in given.items():
+            user = read_class(f"{path}:{name}", f"--code {written}", "")
+            hashes[path] = user.hash
+            if user.hash == entry["sha256"]:
+                found[reference] = user, list(entry["names"])
+                used.add(path)
+                break
+        else:
+            other = next((hashes[path] for path in given if path.name == file), "")
+            text = f"its runs need {file} with the SHA-256 {entry['sha256']}"
+            remedy = f", and the one given has {other}" if other else ": give it with --code FILE"
+            problems.append(Problem(dataset, "", text + remedy))
+    idle = [] if problems else [given[path] for path in given if path not in used]
+    problems += [Problem(f"--code {file}", "", f"{dataset} needs no such file") for file in idle]
+    if problems:
+        raise InputError(*problems)
+    return found
+
+
+def _scenario(dataset: Dataset, text: str, classes: Mapping[str, str]) -> Scenario:
+    """The scenario of a text, whose tables the dataset keeps, and whose classes are those given, by reference."""
     folder, name = dataset.place.local(), dataset.place.name
-    return Scenario(name, folder, *resolve(read_toml(text), name, folder))
+    document = read_toml(text)
+    for table, key in DOORS:
+        if names_file(document[table][key]):  # never a file that the dataset itself asks for
+            document[table][key] = classes[document[table][key]]
+    return Scenario(name, folder, *resolve(document, name, folder))
 
 
 def _found(axis: Axis, kept: dict[str, str]) -> Axis:
-    """An axis whose values are the paths under which the dataset keeps the files that they name."""
-    return replace(axis, values=tuple(kept[value] for value in axis.values)) if axis.key in path_keys() else axis
+    """An axis whose values are where the files are that they name: CSV files in the dataset, users' where they lie."""
+    if axis.key in path_keys():
+        return replace(axis, values=tuple(kept[value] for value in axis.values))
+    if axis.key in {f"{table}.{key}" for table, key in DOORS}:
+        return replace(axis, values=tuple(kept[value] if names_file(value) else value for value in axis.values))
+    return axis
 
 
 def replayed(plan: Plan, run: int) -> Scenario:
@@ -80,12 +126,13 @@ def replayed(plan: Plan, run: int) -> Scenario:
         raise InputError(Problem(plan.sweep.source, "", text, str(run))) from None
 
 
-def files_of(scenario: Scenario) -> dict[str, bytes]:
-    """scenario.toml, and the CSV files that it reads beside it."""
+def files_of(scenario: Scenario, folder: Path) -> dict[str, bytes]:
+    """scenario.toml for `folder`, and the CSV files that it reads beside it; users' classes stay where they are."""
     read = {record.section: record.content for record in records(scenario)}
     paths = {section: f"{TABLES}/{section}.csv" for section in read}
     tables = {paths[section]: content for section, content in read.items()}
-    return {"scenario.toml": portable_text(scenario, paths).encode(), **tables}
+    names = {user.reference: user.reference_from(folder) for user in scenario.code}
+    return {"scenario.toml": portable_text(scenario, paths, names).encode(), **tables}
 
 
 def recorded(dataset: Dataset, plan: Plan, run: int) -> tuple[dict[str, Any], str]:

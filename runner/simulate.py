@@ -144,7 +144,7 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
 
     with Crew(1) as crew:  # a thread of its own, so that Ctrl-C and a progress bar reach a long run
         [runs] = results([crew.begin(lambda watch: loop.run(values, settings, tables, watch=watch))], report)
-    system = loop.program.system
+    system = scenario.system()
     assert runs.trajectory is not None and runs.rows is not None
     rows = runs.trajectory[0, : runs.rows[0]]
     trajectory = pa.Table.from_arrays([pa.array(column) for column in rows.T], schema=trajectory_schema(system))

@@ -16,6 +16,7 @@ import sys
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -38,6 +39,22 @@ _REFERENCE = re.compile(r"(?P<path>.+\.py):(?P<name>[^\W\d]\w*)")
 _PACKAGE = "springline_user_"
 _FOREIGN = frozenset({*sys.stdlib_module_names, "springline"})
 _LONGEST_LINE = 100
+_REFUSED: ContextVar[bool] = ContextVar("refused", default=False)
+
+
+@contextmanager
+def without_code() -> Iterator[None]:
+    """Within, and in no other thread, a scenario that names a user's file is refused: for scenarios of strangers."""
+    before = _REFUSED.set(True)
+    try:
+        yield
+    finally:
+        _REFUSED.reset(before)
+
+
+def refuse_code(refused: bool) -> None:
+    """What `without_code` does, from now on."""
+    _REFUSED.set(refused)
 
 
 @dataclass(frozen=True)
@@ -94,10 +111,12 @@ def read_class(reference: str, where: str, key: str) -> UserClass:
     """Read the file of a canonical reference, and what it imports from beside it; nothing of it runs.
 
     where, key  what the reference stands in, for messages
-    Raises InputError if a file cannot be read or is no Python.
+    Raises InputError if a file cannot be read or is no Python, and where users' files are refused.
     """
     found = _REFERENCE.fullmatch(reference)
     assert found, reference
+    if _REFUSED.get():
+        raise InputError(Problem(where, key, "names a file to run, and --no-code refuses that", reference))
     path = Path(found["path"])
     files: dict[str, bytes] = {}
     pending = [""]

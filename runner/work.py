@@ -18,6 +18,7 @@ from springline.codegen.kernel import (
     KernelSpec,
     LoopSettings,
     Runs,
+    Shape,
     Table,
     Watch,
     kernel,
@@ -25,7 +26,7 @@ from springline.codegen.kernel import (
 from springline.codegen.kernel_source import KernelSource, print_kernel, runtime_sources
 from springline.codegen.manifest import canonical_json
 from springline.codegen.program import program
-from springline.model.system import Structure, System
+from springline.model.system import System
 from springline.runner.scenario import Scenario, Slots, per_run
 from springline.runner.simulate import loop_settings
 from springline.runner.tables import kernel_tables
@@ -137,9 +138,12 @@ def perform(
 
 @dataclass(frozen=True)
 class Parcel:
-    """A Work as it travels to a worker: the kernel's sources, with their hash, instead of a compiled library."""
+    """A Work as it travels to a worker: the kernel's sources, with their hash, instead of a compiled library.
 
-    structure: Structure
+    Nothing of a model is built there, so a worker needs no file of the user's, and runs none.
+    """
+
+    shape: Shape
     source: KernelSource
     hash: str
     settings: LoopSettings
@@ -151,7 +155,7 @@ def parcel(work: Work) -> Parcel:
     """Pack a Work. Raises ToolchainError where there is no compiler to say how wide vectors are."""
     with _COMPILING:
         source = print_kernel(program(work.spec.structure), work.spec)
-    return Parcel(work.spec.structure, source, source.hash, work.settings, work.tables)
+    return Parcel(Shape.of(work.system), source, source.hash, work.settings, work.tables)
 
 
 def perform_parcel(parcel: Parcel, parameters: Floats, kept: Sequence[int] = ()) -> Outcome:
@@ -170,5 +174,5 @@ def _received(parcel: Parcel) -> Kernel:
         raise ValueError("the kernel's sources were damaged on the way to this worker")
     with _COMPILING:
         if parcel.hash not in _received_kernels:
-            _received_kernels[parcel.hash] = Kernel(program(parcel.structure), parcel.source)
+            _received_kernels[parcel.hash] = Kernel(parcel.shape, parcel.source)
         return _received_kernels[parcel.hash]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from springline.runner.commands.options import Changes, overrides
+from springline.runner.commands.options import Changes, NoCode, overrides
 from springline.runner.terminal import complain, console, print_json, print_table, say
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def batch(
         ),
     ] = "",
     changes: Changes = None,
+    no_code: NoCode = False,
     jobs: Annotated[
         int | None, typer.Option("--jobs", min=1, show_default="one per processor", help="Threads.")
     ] = None,
@@ -293,6 +294,11 @@ def replay(
             "-o", "--output", metavar="DIR", show_default="results/DATASET-RUN", help="Folder for the results."
         ),
     ] = None,
+    code: Annotated[
+        list[Path] | None,
+        typer.Option("--code", metavar="FILE", help="A Python file that the runs need.", show_default=False),
+    ] = None,
+    no_code: NoCode = False,
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Draw figures.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
@@ -314,13 +320,13 @@ def replay(
     source = Dataset(place(dataset))
     folder = output or Path("results", f"{Path(dataset).name}-{run}")
     refuse_occupied(folder, force=force)
-    plan = stored_plan(source)
+    plan = stored_plan(source, code or ())
     scenario = replayed(plan, run)
     row, flaw = recorded(source, plan, run)
     if flaw:
         complain(flaw)
     result = simulate(scenario)
-    files = files_of(scenario)
+    files = files_of(scenario, folder)
     if plot:
         for name, figure in run_figures(scenario, result).items():
             files |= figure_files(f"figures/{name}", figure)

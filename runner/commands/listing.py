@@ -21,6 +21,7 @@ class What(StrEnum):
     """The lists."""
 
     mechanisms = "mechanisms"
+    controllers = "controllers"
     laws = "laws"
     parameters = "parameters"
     scenarios = "scenarios"
@@ -31,9 +32,10 @@ def list_(
     what: Annotated[What, typer.Argument(help="Which list.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
-    """List mechanisms, laws, parameters, packaged scenarios or sweeps."""
+    """List mechanisms, controllers, laws, parameters, packaged scenarios or sweeps."""
     rows = {
         "mechanisms": mechanisms,
+        "controllers": controllers,
         "laws": laws,
         "parameters": parameters,
         "scenarios": scenarios,
@@ -59,6 +61,16 @@ def mechanisms() -> list[Row]:
             ],
         }
         for mechanism in MECHANISMS.values()
+    ]
+
+
+def controllers() -> list[Row]:
+    """Every controller with its own parameters, beside those of [control] that all have."""
+    from springline.model.control import CONTROLLERS
+
+    return [
+        {"name": item.name, "title": item.title, "parameters": [parameter.name for parameter in item.parameters]}
+        for item in CONTROLLERS.values()
     ]
 
 

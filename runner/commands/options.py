@@ -26,6 +26,18 @@ Changes = Annotated[
     ),
 ]
 
+
+def _refuse(refused: bool) -> bool:
+    from springline.runner.user_code import refuse_code
+
+    refuse_code(refused)
+    return refused
+
+
+NoCode = Annotated[
+    bool, typer.Option("--no-code", help="Refuse a scenario that names a Python file to run.", callback=_refuse)
+]
+
 TUNABLE = "NAMES|all|none"
 
 _RESULTS = {

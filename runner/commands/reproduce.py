@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from springline.runner.commands.options import Changes, expect_folder, overrides, refuse_results
+from springline.runner.commands.options import Changes, NoCode, expect_folder, overrides, refuse_results
 from springline.runner.errors import InputError, unknown
 from springline.runner.terminal import number, print_json, print_table, progress, say
 
@@ -21,6 +21,7 @@ def reproduce(
         typer.Option("--group", metavar="N", help="A group of Table 2 alone. May be given again.", show_default="all"),
     ] = None,
     changes: Changes = None,
+    no_code: NoCode = False,
     force: Annotated[
         bool, typer.Option("--force", help="Replace files that were edited since, and a report that has more.")
     ] = False,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from springline.runner.commands.options import Changes, overrides, refuse_occupied
+from springline.runner.commands.options import Changes, NoCode, overrides, refuse_occupied
 from springline.runner.errors import InputError, Problem
 from springline.runner.terminal import complain, number, print_json, print_table, progress, say
 
@@ -52,6 +52,7 @@ def run(
         typer.Option("-o", "--output", metavar="DIR", show_default="results/SCENARIO", help="Folder for the results."),
     ] = None,
     changes: Changes = None,
+    no_code: NoCode = False,
     engine: Annotated[Engine, typer.Option(help="The engine.")] = Engine.lanes,
     form: Annotated[Format, typer.Option("--format", help="Format of the tables.")] = Format.parquet,
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Draw figures.")] = True,

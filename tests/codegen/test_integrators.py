@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.model.integrators import INTEGRATORS, Tableau
-from springline.model.system import SignalShape, Structure
+from springline.model.system import SignalShape, Structure, System
 
 pytestmark = pytest.mark.usefixtures("other_arms")
 
@@ -35,7 +35,7 @@ def structure_of(integrator):
 def simulate(integrator, steps, **options):
     options = KernelOptions(width=1, groups=1, packs=1, flags=QUICK, **options)
     loop = kernel(KernelSpec(structure_of(integrator), True, options=options))
-    values = np.array([[VALUES.get(slot.key, slot.default) for slot in loop.program.system.slots]])
+    values = np.array([[VALUES.get(slot.key, slot.default) for slot in System(structure_of(integrator)).slots]])
     settings = LoopSettings(steps, DURATION / steps, hold=steps, output_every=steps)
     runs = loop.run(values, settings)
     return runs.final_state[0], runs.trajectory[0]
@@ -74,7 +74,7 @@ def test_engines_and_widths_agree_to_the_bit(name):
     np.testing.assert_array_equal(simulate(name, 40)[0], reference)
     loop = kernel(KernelSpec(structure_of(name), options=KernelOptions(width=4, groups=2, flags=QUICK)))
     scalar = kernel(KernelSpec(structure_of(name), options=KernelOptions(engine="casadi", flags=QUICK)))
-    values = np.array([[VALUES.get(slot.key, slot.default) for slot in loop.program.system.slots]] * 9)
+    values = np.array([[VALUES.get(slot.key, slot.default) for slot in System(structure_of(name)).slots]] * 9)
     values[:, loop.parameters.index("initial.q.0")] = np.linspace(-0.3, 0.4, 9)
     settings = LoopSettings(200, 1e-3, output_every=50)
     wide, one = loop.run(values, settings), scalar.run(values, settings)
@@ -114,7 +114,7 @@ def test_eighth_order_at_one_millisecond_beats_rk4_at_a_tenth():
     def final(integrator, per_sample):
         options = KernelOptions(width=1, groups=1, packs=1, flags=QUICK)
         loop = kernel(KernelSpec(Structure(integrator=integrator), True, options=options))
-        p = np.array([[values.get(slot.key, slot.default) for slot in loop.program.system.slots]])
+        p = np.array([[values.get(slot.key, slot.default) for slot in System().slots]])
         return loop.run(p, LoopSettings(600 * per_sample, 1e-3 / per_sample, hold=per_sample)).final_state[0, :2]
 
     truth = final("dop853", 8)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from springline.codegen.kernel import ONE_RUN, STATUS, KernelSpec, LoopSettings, Runs, Watch, kernel
-from springline.model.system import Structure
+from springline.model.system import Structure, System
 from springline.runner.crew import Crew, results
 from springline.runner.work import perform
 
@@ -19,7 +19,7 @@ LONG = LoopSettings(1_000_000_000, 1e-5)  # minutes
 @pytest.fixture
 def call() -> Callable[[Watch], Runs]:
     loop = kernel(KernelSpec(Structure(), options=ONE_RUN))
-    values = np.array([[slot.default for slot in loop.program.system.slots]])
+    values = np.array([[slot.default for slot in System().slots]])
     return lambda watch: loop.run(values, LONG, watch=watch)
 
 
@@ -45,7 +45,7 @@ def test_ctrl_c_while_waiting_ends_the_calls(call: Callable[[Watch], Runs]) -> N
 
 def test_kept_runs_are_stopped_too_and_counted_once() -> None:
     loop = kernel(KernelSpec(Structure(), options=ONE_RUN))
-    values = np.array([[slot.default for slot in loop.program.system.slots]] * 4)
+    values = np.array([[slot.default for slot in System().slots]] * 4)
     watch = Watch()
     perform(loop, LoopSettings(5000, 1e-5, output_every=500), (), values, [0, 2], watch)
     assert watch.progress.value == 4 * 5000
