@@ -22,7 +22,6 @@ from springline.codegen.program import count_operations
 from springline.codegen.tables import Table
 from springline.model.parameters import Slot
 from springline.model.quantities import BASE, DDQ1, DERIVATIVES, REFERENCE, SIGMA, E, Quantity, T, entries
-from springline.model.sliding import LAWS
 from springline.model.system import Structure, System
 
 PERIOD = 1e-3
@@ -42,9 +41,8 @@ MODEL_FUNCTIONS = (
     "control",
     "rates",
     "update",
-    *(f"law_{name}" for name in LAWS),
 )
-"""Functions of a System that an export offers under <prefix>_<name>."""
+"""Functions of a System that an export offers under <prefix>_<name>, beside law_<name> of its reaching law."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +95,10 @@ class Export:
         return self.values[[slot.key for slot in self.slots].index(key)]
 
     def model_functions(self) -> Iterator[tuple[str, ca.Function]]:
-        """Public name and frozen Function (last input p: all slots) of everything in MODEL_FUNCTIONS that it has."""
-        for name in (name for name in MODEL_FUNCTIONS if name in self.system.functions):
+        """Public name and frozen Function (last input p: all slots) of everything in MODEL_FUNCTIONS that it has, and its law."""
+        law = self.system.controller.law
+        names = (*MODEL_FUNCTIONS, *([f"law_{law.name}"] if law else []))
+        for name in (name for name in names if name in self.system.functions):
             yield f"{self.prefix}_{name}", self.system.function(name)
 
     def inputs(self, function: ca.Function) -> list[Port]:

@@ -38,11 +38,12 @@ def document(
     export: Export, interface: Interface, settings: Settings, version: FmiVersion, *, name: str, identifier: str
 ) -> bytes:
     """The page, UTF-8."""
-    structure = export.system.structure
+    system = export.system
     unlimited = any(variable.bounds.infinite for variable in interface.variables)
     facts = [
         f"FMI {version}.0 for Co-Simulation, model identifier <code>{identifier}</code>.",
-        f"Mechanism {structure.mechanism}, control law {structure.law}.",
+        f"Mechanism {system.mechanism.name}, controller: {system.controller.title}"
+        f"{f', reaching law: {system.controller.law.title}' if system.controller.law else ''}.",
         *_stepping(export, interface, settings),
         "Communication steps may have any length and may change. Time counts from the start time of the experiment"
         f"{', the scenario with it' if interface.part != 'controller' else ''}; a start time at which doubles are more "

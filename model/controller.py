@@ -164,6 +164,8 @@ def commanded(
     """
     n, states = len(joints), states_of(controller, joints, z)
     given = controller.control(r, y, states, model, p)
+    if not isinstance(given, Control):
+        raise ValueError(f"controller {controller.name}: control: expected a Control, got {type(given).__name__}")
 
     def column(what: str, value: ca.SX, rows: int) -> ca.SX:
         shape = ca.SX(value).shape

@@ -34,6 +34,9 @@ class Registry(dict[str, T]):
         return super().__contains__(name)
 
     def bring(self, key: str, item: T) -> None:
-        """Add what a user's file holds. Raises ValueError if it is not complete."""
+        """Add what a user's file holds. Raises ValueError if it is not complete, or called as one that there is."""
         self._check(item)
+        name = str(getattr(item, "name", ""))
+        if super().__contains__(name):
+            raise ValueError(f"its name is {name!r}, as that of one that comes with springline: give it another")
         self._brought[key] = item

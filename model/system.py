@@ -29,6 +29,7 @@ from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
 from springline.model.quantities import (
     A_LAW,
+    A_LIMITED,
     BASE,
     DQ1,
     DQ2,
@@ -36,8 +37,10 @@ from springline.model.quantities import (
     Q1,
     Q1D,
     REFERENCE,
+    SATURATED,
     SIGMA,
     U_S,
+    U_WISHED,
     B,
     E,
     Entry,
@@ -182,7 +185,9 @@ class System:
     def _expect_different_names(self) -> None:
         """Raise ValueError where two numbers would have one name in C and in tables."""
         symbols = [slot.symbol for slot in self.slots]
-        for names in (symbols, [entry.name for entry in self.judged], [entry.name for entry in self.metrics]):
+        shown = (*self.columns, *REFERENCE, *self.controller.diagnostics, U_WISHED, A_LAW, SATURATED, A_LIMITED)
+        entered = [entry.name for entry in entries(dict.fromkeys(shown), self.joints)]
+        for names in (symbols, entered, [entry.name for entry in self.metrics]):
             twice = [name for name in names if names.count(name) > 1]
             if twice:
                 raise ValueError(f"mechanism {self.mechanism.name}: two numbers would be called {twice[0]!r}")

@@ -313,15 +313,23 @@ class Scenario:
         where  what the scenario came from, for messages
         Raises InputError.
         """
-        for user in self.code:
-            with told(user, where, ""):
-                _expect_printable(self.structure())
-            if user.reference == self.document["mechanism"]["name"] and self.structure().start == "given":
+        if not self.code:
+            return
+        keys = {
+            user: f"{table}.{key}"
+            for user in self.code
+            for table, key in schema.DOORS
+            if self.document[table][key] == user.reference
+        }
+        with told(keys, where):
+            _expect_printable(self.structure())
+        for user, key in keys.items():
+            if key == "mechanism.name" and self.structure().start == "given":
                 mass = np.array(self.system().function("mass_matrix")(self.document["initial"]["q"], self.values()))
                 sizes = np.linalg.eigvalsh(mass) if np.isfinite(mass).all() else np.array([np.nan])
                 if not sizes[0] > _SINGULAR * sizes[-1]:
                     text = "the mass matrix at the start is not positive definite, its least eigenvalue is"
-                    raise InputError(Problem(where, "mechanism.name", f"{user}: {text} {sizes[0]:.3g}"))
+                    raise InputError(Problem(where, key, f"{user}: {text} {sizes[0]:.3g}"))
 
     def _joints_with(self, overrides: Mapping[str, object], where: str) -> int:
         """How many joints there are with these overrides; 1 for a mechanism that is unknown, which is told later."""

@@ -14,7 +14,7 @@ import os
 import re
 import sys
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -278,7 +278,7 @@ def load_class(user: UserClass, registry: Registry[T], where: str, key: str) -> 
             return registry[user.key]
         package = f"{_PACKAGE}{user.hash}"
         _code[package] = user
-        with told(user, where, key):
+        with told({user: key}, where):
             try:
                 module = import_module(package)
             except BaseException:
@@ -296,21 +296,43 @@ def load_class(user: UserClass, registry: Registry[T], where: str, key: str) -> 
         if not isinstance(found, type) or not issubclass(found, registry.base):
             expected = f"{user}: expected a subclass of springline.model.{registry.base.__name__}"
             raise InputError(Problem(where, key, expected, type(found).__name__, user.name, tuple(kinds)))
-        with told(user, where, key):
-            made: T = found()
+        with told({user: key}, where):
+            made: T = _made(found)
             registry.bring(user.key, made)
         return made
 
 
+def _made(found: Callable[[], T]) -> T:
+    """An object of a class. Raises ValueError for one that cannot be made of nothing, or lacks a method."""
+    try:
+        return found()
+    except TypeError as error:
+        raise ValueError(str(error)) from error
+
+
 @contextmanager
-def told(user: UserClass, where: str, key: str) -> Iterator[None]:
-    """Within, whatever a user's class raises becomes an InputError that names his file, class and lines."""
+def told(users: Mapping[UserClass, str], where: str) -> Iterator[None]:
+    """Within, whatever users' classes raise becomes an InputError that names file, class and lines.
+
+    users  the classes that may run, each with the key that names it
+    """
     try:
         yield
     except InputError:
         raise
     except (Exception, SystemExit) as error:
-        raise InputError(Problem(where, key, f"{user}: {_message(error)}{_lines(error, user)}")) from error
+        user = _blamed(error, users)
+        if not (_lines(error, user) or isinstance(error, ValueError | RuntimeError)):
+            raise  # no line of a user's, and nothing that we or CasADi say of what he gave: a fault of our own
+        raise InputError(Problem(where, users[user], f"{user}: {_message(error)}{_lines(error, user)}")) from error
+
+
+def _blamed(error: BaseException, users: Mapping[UserClass, str]) -> UserClass:
+    """Whose lines an error came from, or else whose kind it begins with: "law my_law: rate: ..."."""
+    kinds = {"mechanism.name": "mechanism", "control.law": "law", "control.controller": "controller"}
+    lines = [user for user in users if _lines(error, user)]
+    named = [user for user, key in users.items() if str(error).startswith(f"{kinds[key]} ")]
+    return [*lines, *named, *users][0]
 
 
 def _message(error: BaseException) -> str:

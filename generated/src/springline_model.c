@@ -93,14 +93,6 @@
  * springline_law_variable_power_log    24 operations
  *   in  0 sigma[1]: sigma (1/s of the joint's unit)
  *   out 0 dsigma[1]: dsigma (1/s^2 of the joint's unit)
- *
- * springline_law_double_power    10 operations
- *   in  0 sigma[1]: sigma (1/s of the joint's unit)
- *   out 0 dsigma[1]: dsigma (1/s^2 of the joint's unit)
- *
- * springline_law_power    7 operations
- *   in  0 sigma[1]: sigma (1/s of the joint's unit)
- *   out 0 dsigma[1]: dsigma (1/s^2 of the joint's unit)
  */
 
 #if defined(__GNUC__) /* the convention has five arguments, whether a function needs them or not */
@@ -133,8 +125,6 @@
 #define casadi_f1 CASADI_PREFIX(f1)
 #define casadi_f10 CASADI_PREFIX(f10)
 #define casadi_f11 CASADI_PREFIX(f11)
-#define casadi_f12 CASADI_PREFIX(f12)
-#define casadi_f13 CASADI_PREFIX(f13)
 #define casadi_f2 CASADI_PREFIX(f2)
 #define casadi_f3 CASADI_PREFIX(f3)
 #define casadi_f4 CASADI_PREFIX(f4)
@@ -2309,189 +2299,6 @@ CASADI_SYMBOL_EXPORT int springline_law_variable_power_log_work_bytes(casadi_int
   return 0;
 }
 
-/* springline_law_double_power:(sigma)->(dsigma) */
-static int casadi_f12(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem) {
-  casadi_real a0, a1, a2, a3, a4;
-  a0=3.0000000000000000e+00;
-  a1=arg[0]? arg[0][0] : 0;
-  a2=casadi_fabs(a1);
-  a3=9.9999999999999998e-121;
-  a2=casadi_fmax(a2,a3);
-  a3=5.0000000000000000e-01;
-  a3=pow(a2,a3);
-  a0=(a0*a3);
-  a3=5.0000000000000000e+00;
-  a4=5.0000000000000000e+00;
-  a2=pow(a2,a4);
-  a3=(a3*a2);
-  a0=(a0+a3);
-  a1=casadi_sign(a1);
-  a0=(a0*a1);
-  a0=(-a0);
-  if (res[0]!=0) res[0][0]=a0;
-  return 0;
-}
-
-CASADI_SYMBOL_EXPORT int springline_law_double_power(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem){
-  return casadi_f12(arg, res, iw, w, mem);
-}
-
-CASADI_SYMBOL_EXPORT int springline_law_double_power_checkout(void) {
-  return 0;
-}
-
-CASADI_SYMBOL_EXPORT void springline_law_double_power_release(int mem) {
-}
-
-CASADI_SYMBOL_EXPORT void springline_law_double_power_incref(void) {
-}
-
-CASADI_SYMBOL_EXPORT void springline_law_double_power_decref(void) {
-}
-
-CASADI_SYMBOL_EXPORT casadi_int springline_law_double_power_n_in(void) { return 1;}
-
-CASADI_SYMBOL_EXPORT casadi_int springline_law_double_power_n_out(void) { return 1;}
-
-CASADI_SYMBOL_EXPORT casadi_real springline_law_double_power_default_in(casadi_int i) {
-  switch (i) {
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT const char* springline_law_double_power_name_in(casadi_int i) {
-  switch (i) {
-    case 0: return "sigma";
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT const char* springline_law_double_power_name_out(casadi_int i) {
-  switch (i) {
-    case 0: return "dsigma";
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT const casadi_int* springline_law_double_power_sparsity_in(casadi_int i) {
-  switch (i) {
-    case 0: return casadi_s5;
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT const casadi_int* springline_law_double_power_sparsity_out(casadi_int i) {
-  switch (i) {
-    case 0: return casadi_s5;
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT int springline_law_double_power_work(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw, casadi_int *sz_w) {
-  if (sz_arg) *sz_arg = 1;
-  if (sz_res) *sz_res = 1;
-  if (sz_iw) *sz_iw = 0;
-  if (sz_w) *sz_w = 0;
-  return 0;
-}
-
-CASADI_SYMBOL_EXPORT int springline_law_double_power_work_bytes(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw, casadi_int *sz_w) {
-  if (sz_arg) *sz_arg = 1*sizeof(const casadi_real*);
-  if (sz_res) *sz_res = 1*sizeof(casadi_real*);
-  if (sz_iw) *sz_iw = 0*sizeof(casadi_int);
-  if (sz_w) *sz_w = 0*sizeof(casadi_real);
-  return 0;
-}
-
-/* springline_law_power:(sigma)->(dsigma) */
-static int casadi_f13(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem) {
-  casadi_real a0, a1, a2, a3;
-  a0=3.0000000000000000e+00;
-  a1=arg[0]? arg[0][0] : 0;
-  a2=casadi_fabs(a1);
-  a3=9.9999999999999998e-121;
-  a2=casadi_fmax(a2,a3);
-  a3=5.0000000000000000e-01;
-  a2=pow(a2,a3);
-  a0=(a0*a2);
-  a1=casadi_sign(a1);
-  a0=(a0*a1);
-  a0=(-a0);
-  if (res[0]!=0) res[0][0]=a0;
-  return 0;
-}
-
-CASADI_SYMBOL_EXPORT int springline_law_power(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem){
-  return casadi_f13(arg, res, iw, w, mem);
-}
-
-CASADI_SYMBOL_EXPORT int springline_law_power_checkout(void) {
-  return 0;
-}
-
-CASADI_SYMBOL_EXPORT void springline_law_power_release(int mem) {
-}
-
-CASADI_SYMBOL_EXPORT void springline_law_power_incref(void) {
-}
-
-CASADI_SYMBOL_EXPORT void springline_law_power_decref(void) {
-}
-
-CASADI_SYMBOL_EXPORT casadi_int springline_law_power_n_in(void) { return 1;}
-
-CASADI_SYMBOL_EXPORT casadi_int springline_law_power_n_out(void) { return 1;}
-
-CASADI_SYMBOL_EXPORT casadi_real springline_law_power_default_in(casadi_int i) {
-  switch (i) {
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT const char* springline_law_power_name_in(casadi_int i) {
-  switch (i) {
-    case 0: return "sigma";
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT const char* springline_law_power_name_out(casadi_int i) {
-  switch (i) {
-    case 0: return "dsigma";
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT const casadi_int* springline_law_power_sparsity_in(casadi_int i) {
-  switch (i) {
-    case 0: return casadi_s5;
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT const casadi_int* springline_law_power_sparsity_out(casadi_int i) {
-  switch (i) {
-    case 0: return casadi_s5;
-    default: return 0;
-  }
-}
-
-CASADI_SYMBOL_EXPORT int springline_law_power_work(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw, casadi_int *sz_w) {
-  if (sz_arg) *sz_arg = 1;
-  if (sz_res) *sz_res = 1;
-  if (sz_iw) *sz_iw = 0;
-  if (sz_w) *sz_w = 0;
-  return 0;
-}
-
-CASADI_SYMBOL_EXPORT int springline_law_power_work_bytes(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw, casadi_int *sz_w) {
-  if (sz_arg) *sz_arg = 1*sizeof(const casadi_real*);
-  if (sz_res) *sz_res = 1*sizeof(casadi_real*);
-  if (sz_iw) *sz_iw = 0*sizeof(casadi_int);
-  if (sz_w) *sz_w = 0*sizeof(casadi_real);
-  return 0;
-}
-
 
 
 /* Another file may follow in the same translation unit. */
@@ -2502,8 +2309,6 @@ CASADI_SYMBOL_EXPORT int springline_law_power_work_bytes(casadi_int *sz_arg, cas
 #undef casadi_f1
 #undef casadi_f10
 #undef casadi_f11
-#undef casadi_f12
-#undef casadi_f13
 #undef casadi_f2
 #undef casadi_f3
 #undef casadi_f4

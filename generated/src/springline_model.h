@@ -93,14 +93,6 @@
  * springline_law_variable_power_log    24 operations
  *   in  0 sigma[1]: sigma (1/s of the joint's unit)
  *   out 0 dsigma[1]: dsigma (1/s^2 of the joint's unit)
- *
- * springline_law_double_power    10 operations
- *   in  0 sigma[1]: sigma (1/s of the joint's unit)
- *   out 0 dsigma[1]: dsigma (1/s^2 of the joint's unit)
- *
- * springline_law_power    7 operations
- *   in  0 sigma[1]: sigma (1/s of the joint's unit)
- *   out 0 dsigma[1]: dsigma (1/s^2 of the joint's unit)
  */
 
 #ifndef SPRINGLINE_MODEL_H
@@ -281,34 +273,6 @@ const long long int* springline_law_variable_power_log_sparsity_in(long long int
 const long long int* springline_law_variable_power_log_sparsity_out(long long int i);
 int springline_law_variable_power_log_work(long long int *sz_arg, long long int* sz_res, long long int *sz_iw, long long int *sz_w);
 int springline_law_variable_power_log_work_bytes(long long int *sz_arg, long long int* sz_res, long long int *sz_iw, long long int *sz_w);
-int springline_law_double_power(const double** arg, double** res, long long int* iw, double* w, int mem);
-int springline_law_double_power_checkout(void);
-void springline_law_double_power_release(int mem);
-void springline_law_double_power_incref(void);
-void springline_law_double_power_decref(void);
-long long int springline_law_double_power_n_in(void);
-long long int springline_law_double_power_n_out(void);
-double springline_law_double_power_default_in(long long int i);
-const char* springline_law_double_power_name_in(long long int i);
-const char* springline_law_double_power_name_out(long long int i);
-const long long int* springline_law_double_power_sparsity_in(long long int i);
-const long long int* springline_law_double_power_sparsity_out(long long int i);
-int springline_law_double_power_work(long long int *sz_arg, long long int* sz_res, long long int *sz_iw, long long int *sz_w);
-int springline_law_double_power_work_bytes(long long int *sz_arg, long long int* sz_res, long long int *sz_iw, long long int *sz_w);
-int springline_law_power(const double** arg, double** res, long long int* iw, double* w, int mem);
-int springline_law_power_checkout(void);
-void springline_law_power_release(int mem);
-void springline_law_power_incref(void);
-void springline_law_power_decref(void);
-long long int springline_law_power_n_in(void);
-long long int springline_law_power_n_out(void);
-double springline_law_power_default_in(long long int i);
-const char* springline_law_power_name_in(long long int i);
-const char* springline_law_power_name_out(long long int i);
-const long long int* springline_law_power_sparsity_in(long long int i);
-const long long int* springline_law_power_sparsity_out(long long int i);
-int springline_law_power_work(long long int *sz_arg, long long int* sz_res, long long int *sz_iw, long long int *sz_w);
-int springline_law_power_work_bytes(long long int *sz_arg, long long int* sz_res, long long int *sz_iw, long long int *sz_w);
 
 #ifdef __cplusplus
 }
