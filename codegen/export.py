@@ -95,7 +95,7 @@ class Export:
         return self.values[[slot.key for slot in self.slots].index(key)]
 
     def model_functions(self) -> Iterator[tuple[str, ca.Function]]:
-        """Public name and frozen Function (last input p: all slots) of everything in MODEL_FUNCTIONS that it has, and its law."""
+        """Public name and frozen Function (last input p: all slots) of MODEL_FUNCTIONS that it has, and its law."""
         law = self.system.controller.law
         names = (*MODEL_FUNCTIONS, *([f"law_{law.name}"] if law else []))
         for name in (name for name in names if name in self.system.functions):

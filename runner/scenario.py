@@ -289,9 +289,10 @@ class Scenario:
         expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
         if not overrides:
             return self
+        where = _overridden(self.source)
+        overrides = self._canonical(overrides, where)
         document = self._without_excluded(overrides)
         problems = []
-        where = _overridden(self.source)
         joints = self._joints_with(overrides, where)
         for key, value in overrides.items():
             try:
@@ -331,12 +332,21 @@ class Scenario:
                     text = "the mass matrix at the start is not positive definite, its least eigenvalue is"
                     raise InputError(Problem(where, key, f"{user}: {text} {sizes[0]:.3g}"))
 
+    def _canonical(self, overrides: Mapping[str, object], where: str) -> dict[str, object]:
+        """Overrides that name users' classes as the document does, so that the same one is known for the same."""
+        doors = {f"{table}.{key}" for table, key in schema.DOORS}
+        return {
+            key: canonical_reference(str(value), self.folder, where, key)
+            if key in doors and schema.names_file(value)
+            else value
+            for key, value in overrides.items()
+        }
+
     def _joints_with(self, overrides: Mapping[str, object], where: str) -> int:
         """How many joints there are with these overrides; 1 for a mechanism that is unknown, which is told later."""
         given = overrides.get("mechanism.name")
         if schema.names_file(given):
-            reference = canonical_reference(str(given), self.folder, where, "mechanism.name")
-            user = read_class(reference, where, "mechanism.name")
+            user = read_class(str(given), where, "mechanism.name")
             return len(load_class(user, MECHANISMS, where, "mechanism.name").joints)
         name = self.registered(self.document["mechanism"]["name"]) if given is None else str(given)
         return len(MECHANISMS[name].joints) if name in MECHANISMS else 1

@@ -264,15 +264,10 @@ def test_infinite_limits_are_no_limits(model, rng):
 
 
 class Linear(Law):
-    """d sigma/dt = -s sigma: the reaching law as it looks near the surface."""
-
-    name, title, parameters = "linear", "linear", ()
-
-    def __init__(self, slope):
-        self.slope = slope
+    """d sigma/dt = -slope sigma: the reaching law as it looks near the surface."""
 
     def rate(self, sigma, p):
-        return -self.slope * sigma
+        return -p.slope * sigma
 
 
 @pytest.fixture(scope="module")
@@ -280,8 +275,9 @@ def largest_real_part():
     """(delta, s, theta3, K_f scale) -> largest real part of the 8-state loop's eigenvalues at e = 0, 1/s."""
     system = System()
     delta, slope, gain = ca.SX.sym("delta"), ca.SX.sym("s"), ca.SX.sym("gain")
-    p = Values({"delta": delta, "mu": ca.SX([12, 5]), "lambda": ca.SX(5), "K_f": gain * ca.SX([200, 2.6]),
-                "a_max": ca.SX([math.inf] * 2), "U_max": ca.SX([math.inf] * 2)})  # fmt: skip
+    p = Values({"delta": delta, "mu": ca.SX([12, 5]), "lambda": ca.SX(5), "slope": slope,
+                "K_f": gain * ca.SX([200, 2.6]), "a_max": ca.SX([math.inf] * 2),
+                "U_max": ca.SX([math.inf] * 2)})  # fmt: skip
     arm = Values({item.name: ca.SX.sym(item.name) for item in system.mechanism.parameters})
     inertia = ca.SX([2.0, 0.01])
     motors = Values({"m_l": ca.SX(2.0), "I": ca.SX(0.01), "k_s2": ca.SX(2e6), "k_s3": ca.SX(2e4)})
@@ -290,7 +286,7 @@ def largest_real_part():
     r = Values({"q": system.q1d, "dq": zero, "ddq": zero})
     y = Values(dict(zip(("q1", "dq1", "q2", "dq2"), ca.vertsplit(system.x, 2), strict=True)))
     model = ArmModel(link, system.q1, system.dq1, inertia)
-    command = TerminalSliding(Linear(slope)).control(r, y, Values({}), model, p).u
+    command = TerminalSliding(Linear()).control(r, y, Values({}), model, p).u
     flow = DRIVES["elastic"].plant(system.x, command, link, system.mechanism, motors)
     base = ca.vertcat(system.base.b, system.base.db, system.base.ddb)
     arguments = [system.x, system.q1d, base, ca.vertcat(*arm.values()), delta, slope, gain]

@@ -1,0 +1,470 @@
+"""Mechanisms, laws and controllers of a user's own file: used wherever the packaged ones are, and never unasked."""
+
+import json
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+from typer.testing import CliRunner
+
+from springline.codegen import toolchain
+from springline.runner.batch import batch
+from springline.runner.cli import app
+from springline.runner.errors import InputError
+from springline.runner.plan import Plan
+from springline.runner.scenario import load_scenario
+from springline.runner.simulate import simulate
+from springline.runner.sweep import load_sweep
+from springline.runner.user_code import without_code
+from springline.runner.work import parcel
+
+LAW = """
+import casadi as ca
+from helper import smooth
+from springline.model.parameters import POSITIVE, Parameter
+from springline.model.sliding import Law
+
+class Smooth(Law):
+    parameters = (Parameter("gain", "1/s", 30.0, "slope", POSITIVE),)
+
+    def rate(self, sigma, p):
+        return -p.gain * smooth(sigma) - p.k1 * sigma
+"""
+HELPER = "import casadi as ca\n\ndef smooth(s):\n    return s / ca.sqrt(1 + s**2)\n"
+ARM = """
+import casadi as ca
+from springline.model.mechanism import Mechanism
+from springline.model.parameters import Joint, Parameter
+
+class Boom(Mechanism):
+    joints = (Joint("luff", "rad", "N m"), Joint("telescope", "m", "N"), Joint("hook", "m", "N"))
+    parameters = (
+        Parameter("m1", "kg", 120.0, "mass of the boom"), Parameter("m2", "kg", 60.0, "mass of the load"),
+        Parameter("L", "m", 2.0, "length"), Parameter("g", "m/s^2", 9.81, "gravity"),
+    )
+    motor_inertia = (Parameter("motor", "{F} s^2/{q}", 4.0, "inertia of a motor", per_joint=True),)
+    stiffness = (Parameter("spring", "{F}/{q}", 2.0e5, "stiffness of a spring", per_joint=True),)
+    start_position = (0.3, 0.2, 0.1)
+
+    def places(self, q, p):
+        along = ca.vertcat(ca.cos(q[0]), ca.sin(q[0]), 0)
+        tip = (p.L + q[1]) * along
+        return [(p.m1, p.L / 2 * along), (p.m2, tip), (p.m2, tip - ca.vertcat(0, q[2], 0))]
+
+    def kinetic_energy(self, q, dq, omega, p):
+        rates = [(m, ca.jtimes(r, q, dq) + ca.cross(omega, r)) for m, r in self.places(q, p)]
+        return sum(m * ca.dot(v, v) / 2 for m, v in rates)
+
+    def potential_energy(self, q, gravity, p):
+        return sum(m * ca.dot(gravity, r) for m, r in self.places(q, p))
+"""
+CONTROLLER = """
+from springline.model.controller import Control, Controller
+from springline.model.parameters import Parameter
+
+class Servo(Controller):
+    parameters = (Parameter("bandwidth", "1/s", 20.0, "of the error", per_joint=True),)
+
+    def control(self, r, y, z, model, p):
+        w, e, arm = p.bandwidth, r.q - y.q1, model(y.q1, y.dq1)
+        return Control(arm.H @ (r.ddq + 2 * w * (r.dq - y.dq1) + w**2 * e) + arm.c + arm.G, e)
+"""
+RUN = "\n[simulation]\nduration = 0.05\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A user's folder: law.py with helper.py beside it, arm.py, servo.py, and scenarios."""
+    place = tmp_path / "user"
+    place.mkdir()
+    texts = {
+        "law.py": LAW, "helper.py": HELPER, "arm.py": ARM, "servo.py": CONTROLLER,
+        "law.toml": f'[control]\nlaw = "law.py:Smooth"\nsmooth = {{ gain = 25.0 }}\n{RUN}',
+        "arm.toml": f'[mechanism]\nname = "arm.py:Boom"\nm2 = 70.0\n{RUN}',
+        "servo.toml": f'[control]\ncontroller = "servo.py:Servo"\nservo.bandwidth = [15.0, 25.0]\n{RUN}',
+        "all.toml": '[mechanism]\nname = "arm.py:Boom"\n[control]\nlaw = "law.py:Smooth"\nmode = "sampled"\n'
+                    f"period = 1e-3\n{RUN}",
+        "sweep.toml": 'scenario = "law.toml"\nmethod = "random"\nsamples = 8\nseed = 1\nchunk = 4\n[vary]\n'
+                      'control.smooth.gain = { uniform = [10.0, 40.0] }\n[keep]\ntrajectories = 4\n',
+    }  # fmt: skip
+    for name, text in texts.items():
+        (place / name).write_text(text)
+    return place
+
+
+def springline(*arguments: object) -> tuple[int, str]:
+    result = CliRunner().invoke(app, [str(item) for item in arguments], catch_exceptions=False)
+    return result.exit_code, result.output
+
+
+# What they are good for
+
+
+def test_a_law_of_a_users_file_is_the_law_of_the_run(folder: Path) -> None:
+    scenario = load_scenario(folder / "law.toml")
+    assert scenario.values()[[slot.key for slot in scenario.system().slots].index("control.smooth.gain")] == 25.0
+    sigma = 0.3
+    rate = scenario.system().function("law_smooth")(sigma, scenario.values())
+    assert float(rate) == pytest.approx(-25.0 * sigma / np.sqrt(1 + sigma**2) - 3.0 * sigma, rel=1e-15)
+    lanes, casadi = (simulate(scenario, engine=engine) for engine in ("lanes", "casadi"))  # type: ignore[arg-type]
+    assert lanes.status == "ok"
+    assert lanes.trajectory.equals(casadi.trajectory)
+    assert not lanes.trajectory.equals(
+        simulate(load_scenario(folder / "law.toml", {"control.law": "power"})).trajectory
+    )
+
+
+def test_a_mechanism_of_a_users_file_brings_its_joints_and_defaults(folder: Path) -> None:
+    scenario = load_scenario(folder / "arm.toml")
+    result = simulate(scenario)
+    assert result.status == "ok"
+    assert {"q1_luff", "q2_telescope", "U_hook"} <= set(result.trajectory.column_names)
+    assert scenario.value_of("plant.m2") == 70.0
+    assert scenario.document["initial"]["q"] == [0.3, 0.2, 0.1]
+
+
+def test_a_controller_of_a_users_file_has_a_table_of_its_own(folder: Path) -> None:
+    scenario = load_scenario(folder / "servo.toml")
+    assert scenario.document["control"]["servo"] == {"bandwidth": [15.0, 25.0]}
+    assert "sigma_lift" not in simulate(scenario).trajectory.column_names
+    changed = scenario.with_overrides({"control.controller": "terminal_sliding"})
+    assert "servo" not in changed.document["control"], "what it excludes goes"
+
+
+def test_batch_varies_what_an_own_law_declares(folder: Path) -> None:
+    scenario = load_scenario(folder / "law.toml")
+    gains = np.array([10.0, 25.0, 40.0])
+    table = batch(scenario, {"control.smooth.gain": gains})
+    alone = simulate(scenario).metrics
+    for name in alone.column_names:
+        assert table[name][1] == alone[name][0]
+
+
+@pytest.mark.parametrize("scenario", ["law.toml", "arm.toml", "servo.toml", "all.toml"])
+def test_exported_c_checks_itself(folder: Path, scenario: str, tmp_path: Path) -> None:
+    code, told = springline("export", "c", folder / scenario, "-o", tmp_path / "c")
+    assert code == 0, told
+    sources = [str(tmp_path / "c" / name) for name in ("src/springline.c", "src/springline_model.c", "self_check.c")]
+    command = [
+        *toolchain.find_compiler().argv,
+        "-std=c99",
+        "-O0",
+        f"-I{tmp_path / 'c/include'}",
+        f"-I{tmp_path / 'c/src'}",
+    ]
+    subprocess.run([*command, *sources, "-o", str(tmp_path / "check")], check=True)
+    checking = [tmp_path / "check", tmp_path / "c/test_vectors.txt"]
+    checked = subprocess.run(checking, capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stdout
+    for file in (tmp_path / "c").rglob("*.*"):
+        assert str(folder).encode() not in file.read_bytes(), f"{file.name} holds a path"
+
+
+def test_fmus_hold_them_too(folder: Path, tmp_path: Path) -> None:
+    for kind in ("fmu2", "fmu3"):
+        code, told = springline("export", kind, folder / "all.toml", "-o", tmp_path / kind)
+        assert code == 0, told
+
+
+# Where they lie
+
+
+def test_paths_count_from_the_file_and_in_overrides_from_here(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder.parent)
+    scenario = load_scenario("user/law.toml")
+    assert load_scenario("paper/nominal", {"control.law": "user/law.py:Smooth"}).code == scenario.code
+    with pytest.raises(InputError, match=r"there is no file .*law\.py"):
+        load_scenario("paper/nominal", {"control.law": "law.py:Smooth"})
+    text = scenario.to_toml(folder.parent / "results")
+    assert 'law = "../user/law.py:Smooth"' in text
+    (folder.parent / "results").mkdir()
+    (folder.parent / "results/scenario.toml").write_text(text)
+    assert load_scenario("results/scenario.toml") == scenario
+
+
+def test_equal_files_in_two_folders_are_one_law_and_other_content_is_another(folder: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    for name in ("law.py", "helper.py", "law.toml"):
+        (other / name).write_bytes((folder / name).read_bytes())
+    first, second = load_scenario(folder / "law.toml"), load_scenario(other / "law.toml")
+    assert first == second
+    assert first.structure() == second.structure()
+    (other / "helper.py").write_text(HELPER.replace("1 +", "2 +"))
+    third = load_scenario(other / "law.toml")
+    assert third != first
+    assert third.structure() != first.structure()
+    results = [simulate(scenario).trajectory for scenario in (first, third)]
+    assert not results[0].equals(results[1]), "each has the helper beside it"
+
+
+def test_what_is_imported_is_private_and_comes_before_what_is_installed(folder: Path) -> None:
+    (folder / "helper.py").write_text(HELPER.replace("import casadi as ca", "import casadi as ca\nimport typer"))
+    (folder / "typer.py").write_text("raise RuntimeError('the one beside the file')")
+    with pytest.raises(InputError, match=r"the one beside the file \(law\.py, line 3.*typer\.py, line 1"):
+        load_scenario(folder / "law.toml")
+    assert "helper" not in sys.modules
+    assert Path(sys.modules["typer"].__file__ or "").parent != folder
+
+
+@pytest.mark.parametrize(
+    ("statement", "files"),
+    [
+        ("from tools.shapes import smooth", {"tools/__init__.py": "", "tools/shapes.py": HELPER}),
+        ("import tools.shapes\nsmooth = tools.shapes.smooth", {"tools/shapes.py": HELPER}),
+        ("from tools import smooth", {"tools/__init__.py": "from .shapes import smooth", "tools/shapes.py": HELPER}),
+        ("from . import shapes\nsmooth = shapes.smooth", {"shapes.py": HELPER}),
+        ("from .shapes import smooth", {"shapes.py": HELPER}),
+    ],
+)
+def test_packages_beside_the_file(folder: Path, statement: str, files: dict[str, str]) -> None:
+    (folder / "law.py").write_text(LAW.replace("from helper import smooth", statement))
+    for name, text in files.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(text)
+    scenario = load_scenario(folder / "law.toml")
+    assert {name for name, _ in scenario.code[0].files} == {"", *files}
+
+
+def test_an_import_inside_a_method_is_found_and_counted(folder: Path) -> None:
+    late = LAW.replace("from helper import smooth\n", "").replace(
+        "        return", "        from helper import smooth\n        return"
+    )
+    (folder / "law.py").write_text(late)
+    assert [name for name, _ in load_scenario(folder / "law.toml").code[0].files] == ["", "helper.py"]
+
+
+# Only when asked for
+
+
+def test_a_stranger_s_scenario_can_be_refused(folder: Path) -> None:
+    (folder / "law.py").write_text("raise RuntimeError('has run')")
+    with without_code(), pytest.raises(InputError, match="names a file to run, and --no-code refuses that"):
+        load_scenario(folder / "law.toml")
+    with pytest.raises(InputError, match="has run"):
+        load_scenario(folder / "law.toml")
+    for command in (
+        ["run", folder / "law.toml"], ["generate", folder / "law.toml"], ["export", "fmu2", folder / "law.toml"],
+        ["batch", folder / "sweep.toml"], ["export", "c", folder / "law.toml"],
+        ["reproduce", "--set", f"control.law={folder / 'law.py'}:Smooth"],
+    ):  # fmt: skip
+        code, told = springline(*command, "--no-code", "-o", folder / "out")
+        assert (code, "refuses that" in told) == (2, True), told
+        assert not (folder / "out").exists()
+
+
+@pytest.fixture
+def dataset(folder: Path) -> Path:
+    code, told = springline("batch", folder / "sweep.toml", "-o", folder / "data", "--no-plot", "--jobs", "1")
+    assert code == 0, told
+    return folder / "data"
+
+
+def test_a_dataset_names_its_code_and_a_replay_is_given_it(folder: Path, dataset: Path) -> None:
+    described = json.loads((dataset / "sweep.json").read_text())
+    assert list(described["code"]) == ["law.py:Smooth"]
+    assert str(folder) not in (dataset / "sweep.json").read_text()
+    digest = described["code"]["law.py:Smooth"]["sha256"]
+    code, told = springline("replay", dataset, 4, "-o", folder / "again")
+    assert (code, not (folder / "again").exists()) == (2, True)
+    assert f"its runs need law.py with the SHA-256 {digest}: give it with --code FILE" in told
+    code, told = springline("replay", dataset, 4, "-o", folder / "again", "--code", folder / "law.py", "--no-plot")
+    assert code == 0, told
+    assert "bit for bit" in told
+    kept = parquet.read_table(dataset / "trajectories/run-000000004.parquet").replace_schema_metadata(None)
+    again = parquet.read_table(folder / "again/trajectory.parquet").replace_schema_metadata(None)
+    assert kept.equals(again)
+    assert load_scenario(folder / "again/scenario.toml").code[0].hash == digest
+
+
+def test_other_code_neither_replays_nor_resumes(folder: Path, dataset: Path) -> None:
+    (dataset / "part-000001.parquet").unlink()
+    (folder / "helper.py").write_text(HELPER + "# changed\n")
+    code, told = springline("replay", dataset, 0, "-o", folder / "again", "--code", folder / "law.py")
+    assert (code, "and the one given has" in told) == (2, True)
+    code, told = springline("batch", folder / "sweep.toml", "-o", dataset, "--resume", "--no-plot")
+    assert code == 2
+    assert "code.law.py:Smooth.sha256" in told
+    (folder / "helper.py").write_text(HELPER)
+    code, told = springline("batch", folder / "sweep.toml", "-o", dataset, "--resume", "--no-plot")
+    assert code == 0, told
+    code, told = springline(
+        "replay", dataset, 0, "-o", folder / "x", "--code", folder / "law.py", "--code", folder / "arm.py"
+    )
+    assert (code, "needs no such file" in told) == (2, True)
+
+
+@pytest.mark.parametrize("place", ["scenario", "vary"])
+def test_a_dataset_cannot_make_anyone_run_a_file(folder: Path, dataset: Path, place: str, tmp_path: Path) -> None:
+    evil, ran = tmp_path / "evil.py", tmp_path / "ran"
+    evil.write_text(f"open({str(ran)!r}, 'w').close()\n")
+    described = json.loads((dataset / "sweep.json").read_text())
+    if place == "scenario":
+        described["scenario"] = described["scenario"].replace("law.py:Smooth", f"{evil}:Smooth")
+    else:
+        described["sweep"]["vary"].append({"key": "control.law", "axis": f'{{ each = ["{evil}:Smooth"] }}'})
+    (dataset / "sweep.json").write_text(json.dumps(described))
+    for given in ([], ["--code", folder / "law.py"]):
+        code, _ = springline("replay", dataset, 0, "-o", folder / "again", *given)
+        assert code == 2
+    assert not ran.exists()
+
+
+def test_a_law_that_varies_is_found_again(folder: Path) -> None:
+    (folder / "sweep.toml").write_text(
+        'scenario = "law.toml"\nmethod = "grid"\n[vary]\n'
+        'control.law = { values = ["law.py:Smooth", "power"] }\ncontrol.k1 = { values = [2.0, 3.0] }\n'
+    )
+    data = folder / "data"
+    code, told = springline("batch", folder / "sweep.toml", "-o", data, "--no-plot")
+    assert code == 0, told
+    table = pa.concat_tables([parquet.read_table(file) for file in sorted(data.glob("part-*.parquet"))])
+    assert table["control.law"].to_pylist() == ["law.py:Smooth"] * 2 + ["power"] * 2
+    for run in (0, 3):
+        code, told = springline("replay", data, run, "-o", folder / f"r{run}", "--code", folder / "law.py", "--no-plot")
+        assert code == 0, told
+        assert "bit for bit" in told
+
+
+# What is wrong with them
+
+
+HEAD = (
+    "import casadi as ca\nfrom springline.model.sliding import Law\nfrom springline.model.controller import Control, "
+    "Controller\nfrom springline.model.mechanism import Mechanism\nfrom springline.model.parameters import Joint, "
+    "Parameter\n"
+)
+OF_ARM = (
+    "class Bad(Mechanism):\n  joints = (Joint('a', 'm', 'N'),)\n  parameters = (Parameter('m', 'kg', 1.0, 'mass'), "
+    "Parameter('g', 'm/s^2', 9.8, 'gravity'))\n  motor_inertia = (Parameter('I', 'kg', 1.0, 'motor'),)\n"
+    "  stiffness = (Parameter('k', 'N/m', 100.0, 'spring'),)\n  def potential_energy(self, q, gravity, p): return 0\n"
+    "  def kinetic_energy(self, q, dq, omega, p): "
+)
+RATE = "class Bad(Law):\n  def rate(self, sigma, p): "
+A, OF_LAW = (
+    "class Bad(Law):\n  parameters = (Parameter('a', '1', 1.0, 'x'),)\n",
+    "  def rate(self, sigma, p): return sigma\n",
+)
+TWO = (
+    OF_ARM.replace("(Joint('a', 'm', 'N'),)", "(Joint('a', 'm', 'N'), Joint('s_a', 'm', 'N'))")
+    .replace("'motor')", "'motor', per_joint=True)")
+    .replace("'spring')", "'spring', per_joint=True)")
+)
+
+
+@pytest.mark.parametrize(
+    ("door", "text", "expected"),
+    [
+        ("control.law", "class Good(Law):\n  def rate(self, sigma, p): return -sigma\n", "unknown class in bad.py"),
+        ("control.law", "class Bad: pass\n", "expected a subclass of springline.model.Law"),
+        ("control.law", "class Bad(Law): pass\n", "abstract method rate"),
+        ("control.law", "class Bad(Law:\n", "bad.py, line 6: invalid syntax"),
+        ("control.law", "x = '\0'\n", "bad.py"),
+        ("control.law", "import nothere\n", "No module named 'nothere' (bad.py, line 6"),
+        ("control.law", "import sys\nsys.exit(3)\n", "SystemExit: 3 (bad.py, line 7"),
+        ("control.law", f"{RATE}return -sigma * p.k9\n", "there is no 'k9' here, but k1,"),
+        ("control.law", f"{RATE}return ca.vertcat(sigma, sigma)\n", "law bad: rate: expected a scalar, got 2 x 1"),
+        ("control.law", f"{RATE}pass\n", "expected a CasADi SX expression, got NoneType"),
+        ("control.law", f"{RATE}return -sigma * ca.SX.sym('k')\n", "depends on 'k', which it was not given"),
+        ("control.law", f"{RATE}return -ca.erf(sigma)\n", "the operation OP_ERF of the Function 'control'"),
+        ("control.law", A.replace("'a'", "'a b'") + OF_LAW,
+         "expected a letter, then letters, digits and underscores, got 'a b'"),
+        ("control.law", A.replace("'x'", "'x */'") + OF_LAW,
+         "expected a line of text without /* and */"),
+        ("control.law", A.replace("1.0", "'b'") + OF_LAW,
+         "expected as default a finite number, got 'b'"),
+        ("control.law", f"{A}  name = 'mode'\n{OF_LAW}", "'mode' is a key of [control] already"),
+        ("control.law", f"class Bad(Law):\n  name = 'power'\n{OF_LAW}", "its name is 'power'"),
+        ("mechanism.name", "class Bad(Mechanism):\n  def kinetic_energy(self, *a): return 0\n"
+         "  def potential_energy(self, *a): return 0\n", "joints: expected a tuple of at least one Joint"),
+        ("mechanism.name", f"{OF_ARM}return 0\n", "the mass matrix at the start is not positive definite"),
+        ("mechanism.name", f"{OF_ARM}return -p.m * dq**2\n", "the mass matrix at the start is not positive definite"),
+        ("mechanism.name", f"{OF_ARM}return p.m * ca.SX.sym('z') * dq**2\n", "kinetic_energy: depends on 'z'"),
+        ("mechanism.name", f"{OF_ARM}return p.m * dq**2 * (1 + omega[0]**2)\n", "depends on the base's rate"),
+        ("mechanism.name", f"{OF_ARM}return p.m * dq**3\n", "depends on the joint rates"),
+        ("mechanism.name", f"{OF_ARM}return p.m * ca.dot(dq, omega)\n", "dot: Dimension mismatch (bad.py, line 12"),
+        ("mechanism.name", f"{OF_ARM}return p.m * dq[1]**2\n", "out of bounds"),
+        ("mechanism.name", f"{TWO}return p.m * ca.dot(dq, dq)\n", "two numbers would be called 'U_s_a'"),
+        ("mechanism.name", f"{OF_ARM}return p.m * dq**2\n".replace("'g'", "'G'"), "expected one called g"),
+        ("mechanism.name", f"{OF_ARM}return p.m * dq**2\n".replace("'a'", "'2 a'"), "got '2 a'"),
+        ("control.controller", "class Bad(Controller):\n  def control(self, r, y, z, model, p): return r.q\n",
+         "control: expected a Control, got SX"),
+        ("control.controller",
+         "class Bad(Controller):\n  def control(self, r, y, z, model, p): return Control(r.q, r.q[0])\n",
+         "error has shape 1 x 1, expected 2 x 1"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_with_file_class_and_lines(tmp_path: Path, door: str, text: str, expected: str) -> None:
+    (tmp_path / "bad.py").write_text(HEAD + text)
+    table, _, key = door.partition(".")
+    (tmp_path / "bad.toml").write_text(f'[{table}]\n{key} = "bad.py:Bad"\n')
+    code, told = springline("run", tmp_path / "bad.toml", "-o", tmp_path / "out")
+    assert (code, "Traceback" in told) == (2, False), told
+    assert expected in told
+    assert f"{door.partition('.')[0]}" in told
+    assert "bad.py" in told or "is a key of" in told
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("gone.py:Bad", "there is no file"),
+        ("law.py", "expected a file and the name of a class in it"),
+        ("law.py:2x", "expected a file and the name of a class in it"),
+        ("law.py:", "expected a file and the name of a class in it"),
+        (".:X.py:Y", "there is no file"),
+        ("lawe.py:Smooth", "did you mean 'law.py'"),
+        ("/dev/zero.py:Smooth", "there is no file"),
+    ],
+)
+def test_a_reference_that_leads_nowhere(folder: Path, name: str, expected: str) -> None:
+    (folder / "bad.toml").write_text(f'[control]\nlaw = "{name}"\n')
+    with pytest.raises(InputError, match=r"control\.law") as told:
+        load_scenario(folder / "bad.toml")
+    assert expected in str(told.value)
+
+
+def test_a_table_of_a_law_that_is_not_chosen_is_an_unknown_key(folder: Path) -> None:
+    (folder / "bad.toml").write_text("[control]\nsmooth = { gain = 2.0 }\n")
+    with pytest.raises(InputError, match=r"control\.smooth: unknown key"):
+        load_scenario(folder / "bad.toml")
+    (folder / "bad.toml").write_text('[control]\nlaw = "law.py:Smooth"\nsmooth = { gian = 2.0 }\n')
+    with pytest.raises(InputError, match=r"control\.smooth\.gian: unknown key.*did you mean 'gain'"):
+        load_scenario(folder / "bad.toml")
+
+
+def test_a_fault_of_our_own_is_none_of_the_user_s(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise KeyError("of ours")
+
+    monkeypatch.setattr("springline.codegen.lanes.emit", broken)
+    (folder / "law.py").write_text(LAW + "# as no other test has it\n")
+    with pytest.raises(KeyError, match="of ours"):
+        load_scenario(folder / "law.toml")
+
+
+def test_workers_need_no_file(folder: Path, dataset: Path) -> None:
+    """A parcel is simulated where nothing of the user's can be read or run."""
+    plan = Plan(load_sweep(folder / "sweep.toml"))
+    chunk = plan.chunk(0)
+    sent = pickle.dumps((parcel(chunk.group.work), plan.parameters(chunk, plan.columns(chunk))))
+    (folder / "parcel").write_bytes(sent)
+    for file in ("law.py", "helper.py", "law.toml"):
+        (folder / file).unlink()
+    program = (
+        "import pickle, sys; from springline.runner.work import perform_parcel\n"
+        "outcome = perform_parcel(*pickle.load(open(sys.argv[1], 'rb')))\n"
+        "sys.stdout.buffer.write(outcome.runs.metrics.tobytes())\n"
+        "assert not any('springline_user' in name for name in sys.modules)\n"
+    )
+    there = subprocess.run([sys.executable, "-c", program, folder / "parcel"], check=True, capture_output=True).stdout
+    metrics = np.frombuffer(there).reshape(4, 2, -1)
+    part = parquet.read_table(dataset / "part-000000.parquet")
+    np.testing.assert_array_equal(metrics[:, 0, 0], part["response_time_lift"].to_numpy())
+    assert np.isfinite(metrics[:, 0, 5]).all()
