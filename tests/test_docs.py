@@ -119,7 +119,17 @@ def run_shell(block: Block) -> None:
         assert result.exit_code == 0, f"{block}: {line}\n{result.output}{result.exception!r}"
 
 
+def shown_file(block: Block) -> Path | None:
+    """The file that a block is the content of, if it begins with its name: "# my_arm.py"."""
+    name = re.match(r"# ([\w-]+\.\w+)$", block.text, re.MULTILINE)
+    return Path(name[1]) if name else None
+
+
 def run_python(block: Block) -> None:
+    file = shown_file(block)
+    if file:
+        file.write_text(block.text, encoding="utf-8")
+        return
     if "pandas" in block.text:
         pytest.importorskip("pandas")
     try:
@@ -134,7 +144,7 @@ def run_toml(block: Block) -> None:
     for table in document.values():
         if isinstance(table, dict) and table.get("kind") == "table":
             write_record(Path(table["path"]), list(table["columns"].values()), float(table.get("t0", 0.0)))
-    file = Path("documented.toml")
+    file = shown_file(block) or Path("documented.toml")
     file.write_text(block.text, encoding="utf-8")
     try:
         if kind_of(document) == "sweep":
@@ -205,7 +215,7 @@ INLINE = [
     for code in dict.fromkeys(re.findall(rf"(?<!`)`((?:{'|'.join(PROGRAMS)})\s[^`]+)`", page.read_text("utf-8")))
 ]
 # Words that stand for something; whatever else is written large is a command's own word.
-PLACEHOLDERS = {"SCENARIO": "paper/nominal", "DIR": "out", "SWEEP": "gains", "N": "1", "NAMES": "all", "NAME": "arm"}
+PLACEHOLDERS = {"SCENARIO": "paper/nominal", "DIR": "out", "SWEEP": "gains", "N": "1", "NAMES": "all", "NAME": "arm", "FILE": "law.py"}
 
 
 @pytest.mark.parametrize("code", INLINE)
