@@ -10,7 +10,7 @@ BIN    := .venv/bin
 # Byte code is left to the first import, which halves the time of the installation. The warnings silenced
 # here are setuptools' about our editable mode.
 PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-build-isolation
-SHIPPED = $(shell find model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
+SHIPPED = $(shell find springline model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
 .PHONY: help install reproduce test test-full lint format docs-tables math-accuracy firmware bench clean FORCE
@@ -40,7 +40,7 @@ format: .venv/installed ## let ruff put the code in order
 	$(BIN)/ruff format
 
 docs-tables: .venv/installed ## print the tables of columns and metrics in docs/scenarios.md anew
-	$(BIN)/python -m runner.docs_tables --write
+	$(BIN)/python -m runner.report.docs_tables --write
 
 math-accuracy: .venv/installed ## measure the elementary functions against mpmath; writes the table in docs/math.md
 	$(BIN)/python -m benchmarks.math_accuracy --write

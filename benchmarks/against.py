@@ -42,19 +42,19 @@ def packages_of(interpreter: Path) -> Iterator[None]:
 
     Raises CalledProcessError if it cannot import it.
     """
-    command = [str(interpreter), "-B", "-c", _ROOT]
+    command = [str(interpreter), "-IB", "-c", _ROOT]
     root = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
 
     def taken() -> dict[str, object]:
         names = [name for name in sys.modules if name.partition(".")[0] == "springline"]
         return {name: sys.modules.pop(name) for name in names}
 
-    before = taken()
-    sys.path.insert(0, root)
+    before, path = taken(), sys.path
+    sys.path = [root, *(place for place in path if not (Path(place) / "springline").is_dir())]
     try:
         yield
     finally:
-        sys.path.remove(root)
+        sys.path = path
         taken()
         sys.modules.update(before)  # type: ignore[arg-type]
 
@@ -104,8 +104,8 @@ def kernels(interpreter: Path) -> dict[str, Timed]:
     """
     found = {}
     with packages_of(interpreter):
-        contenders = importlib.import_module("springline.benchmarks.contenders.ours").CONTENDERS
-        toolchain = importlib.import_module("springline.codegen.toolchain")
+        ours = importlib.import_module("springline.benchmarks.contenders.ours")
+        toolchain = ours.toolchain  # from where it lies in that checkout
         load: Callable[[Path], ctypes.CDLL] = vars(toolchain)["load"]
         clocks: list[Clock] = []
 
@@ -114,7 +114,7 @@ def kernels(interpreter: Path) -> dict[str, Timed]:
             return clocks[-1]
 
         vars(toolchain)["load"] = clocked
-        for contender in contenders:
+        for contender in ours.CONTENDERS:
             if contender.variant in WORK:
                 run = contender.build()
                 found[contender.variant] = Timed(run, contender.batch, clocks[-1])

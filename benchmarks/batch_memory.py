@@ -38,7 +38,7 @@ simulation.duration = 4e-4
 control.delta = {{ uniform = [0.03, 0.05] }}
 """
 
-COMMAND = "from springline.runner.cli import main; main()"
+COMMAND = "from springline.runner.cli.application import main; main()"
 
 PYTHON = """
 import sys

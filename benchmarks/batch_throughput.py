@@ -22,11 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from springline.runner.batch import open_pool, processors, run_sweep, versions
-from springline.runner.commands.batch import time_text
-from springline.runner.dataset import Dataset, place
-from springline.runner.plan import Plan
-from springline.runner.sweep import load_sweep
+from springline.runner.cli import time_text
+from springline.runner.sweep import Dataset, Plan, load_sweep, open_pool, place, processors, run_sweep, versions
 
 SWEEP = """
 scenario = "paper/nominal"

@@ -24,8 +24,7 @@ import numpy as np
 from springline.benchmarks import problem, roofline
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, ours
-from springline.codegen import toolchain
-from springline.codegen.kernel import kernel
+from springline.codegen.kernel import kernel, toolchain
 
 PACKAGES = ("casadi", "jax", "numba", "numpy", "scipy")
 

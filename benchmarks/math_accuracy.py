@@ -23,8 +23,8 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from springline.codegen import toolchain
-from springline.runner.docs_tables import put
+from springline.codegen.kernel import toolchain
+from springline.runner.report import put
 
 Floats = NDArray[np.float64]
 Sampler = Callable[[np.random.Generator, int], tuple[Floats, ...]]

@@ -20,8 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from springline.benchmarks.contenders import ours
-from springline.codegen import lanes, toolchain
-from springline.codegen.kernel_source import best_flags, runtime_sources
+from springline.codegen.kernel import best_flags, lanes, runtime_sources, toolchain
 from springline.codegen.program import program
 
 _SOURCE = Path(__file__).with_name("math_speed.c")

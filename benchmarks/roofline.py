@@ -20,8 +20,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from springline.codegen import toolchain
-from springline.codegen.kernel import Kernel
+from springline.codegen.kernel import Kernel, toolchain
 
 _CHAINS = 12
 _ROUNDS = 2_000_000

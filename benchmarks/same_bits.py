@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from springline.runner.locate import packaged_scenarios
+from springline.runner.scenario import packaged_scenarios
 
 # Runs in the other checkout too, so it uses nothing but what every version has.
 _RUN = """

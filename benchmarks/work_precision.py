@@ -25,10 +25,9 @@ from scipy.integrate import solve_ivp
 
 from springline.model.integrators import INTEGRATORS
 from springline.model.quantities import Q1
-from springline.runner.docs_tables import put
-from springline.runner.plots import COLUMN, LINES, figure_files, house_style, legend_above, panels, symbol
+from springline.runner.report import COLUMN, LINES, figure_files, house_style, legend_above, panels, put, symbol
+from springline.runner.run import simulate
 from springline.runner.scenario import Scenario, load_scenario
-from springline.runner.simulate import simulate
 
 Floats = NDArray[np.float64]
 

@@ -1,1 +1,5 @@
 """Symbolic model: mechanism, moving base, series elastic drive, controller. CasADi expressions only."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

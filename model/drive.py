@@ -17,11 +17,11 @@ from typing import Literal, Protocol
 import casadi as ca
 
 from springline.model.lagrange import EquationsOfMotion
-from springline.model.linear import over, solve_spd
-from springline.model.mechanism import Mechanism
+from springline.model.mechanisms import Mechanism
 from springline.model.parameters import Bounds, Parameter, Values
 from springline.model.perturbation import slow_mass
 from springline.model.quantities import DQ1, DQ2, Q1, Q2, Quantity
+from springline.model.symbolic import over, solve_spd
 
 DriveKind = Literal["elastic", "rigid"]
 

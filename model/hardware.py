@@ -4,7 +4,7 @@ The loop is described once, in this order:
 
     signals -> sense -> control -> hold -> delay -> actuate -> plant
 
-`control` is the controller with its limit U_max, and its states z (model/controller.py) go on where the command does:
+`control` is the controller with its limit U_max, and its states z (model/control/) go on where the command does:
 in every stage, or once a sample. An effect stands at `sense`, `delay` or `actuate`. Those that a structure names are
 part of its Functions, and so of all that is printed from them: the batch kernel, the exported C, FMUs and test vectors.
 What no structure names is nowhere printed.

@@ -16,9 +16,9 @@ import casadi as ca
 
 from springline.model.base import BaseMotion
 from springline.model.declared import column
-from springline.model.mechanism import Mechanism
-from springline.model.normal_form import collect
+from springline.model.mechanisms import Mechanism
 from springline.model.parameters import Values
+from springline.model.symbolic import collect
 
 
 @dataclass(frozen=True, slots=True)

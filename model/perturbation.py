@@ -8,7 +8,7 @@ from __future__ import annotations
 import casadi as ca
 
 from springline.model.lagrange import EquationsOfMotion
-from springline.model.linear import over, solve_spd
+from springline.model.symbolic import over, solve_spd
 
 
 def slow_mass(mass: ca.SX, motor_inertia: ca.SX) -> ca.SX:

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import casadi as ca
 
-from springline.model.linear import solve_spd
+from springline.model.symbolic import solve_spd
 
 
 @dataclass(frozen=True, slots=True)

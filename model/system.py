@@ -9,23 +9,32 @@ the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db,
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
-from typing import Literal
 
 import casadi as ca
 
 from springline.model import perturbation, signals
 from springline.model.base import COORDINATES, BaseMotion
-from springline.model.control import CONTROLLERS, K_F, U_MAX, fast_control
-from springline.model.controller import ArmModel, Controller, ControlSignals, commanded
+from springline.model.control import (
+    A_MAX,
+    CONTROLLERS,
+    K_F,
+    LAWS,
+    SURFACE_PARAMETERS,
+    U_MAX,
+    ArmModel,
+    Controller,
+    ControlSignals,
+    Law,
+    commanded,
+    fast_control,
+)
 from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
 from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.lagrange import EquationsOfMotion, equations_of_motion
-from springline.model.linear import as_written
-from springline.model.mechanism import Mechanism
-from springline.model.mechanisms import MECHANISMS
+from springline.model.mechanisms import MECHANISMS, Mechanism
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
 from springline.model.quantities import (
     A_LAW,
@@ -49,60 +58,9 @@ from springline.model.quantities import (
     U,
     entries,
 )
-from springline.model.signals import CONSTANT_ZERO, Signal
-from springline.model.sliding import A_MAX, LAWS, SURFACE_PARAMETERS, Law, LogForm, SurfaceExponents
-
-SignalKind = Literal["none", "sine", "polynomial", "table"]
-MotorStart = Literal["unloaded", "equilibrium", "given"]
-JointStart = Literal["given", "reference"]
-
-
-@dataclass(frozen=True, slots=True)
-class SignalShape:
-    """The shape of a vector signal: its kind, and what it has per coordinate.
-
-    terms  sine: number of terms; polynomial: number of via points; table: 1 with a column, 0 (zero) without
-    """
-
-    kind: SignalKind = "none"
-    terms: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Structure:
-    """Everything about a system that is no number: a new structure is a new kernel, a new number is not.
-
-    controller     by name; law, log_form and exponents are those of one that has a reaching law
-    start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
-    effects        properties of sensors and motors, by name, in the order in which they act
-    initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
-                   told; on the reference they start with springs that carry the arm along it
-    """
-
-    mechanism: str = "transfer_manipulator"
-    law: str = "variable_power_log"
-    log_form: LogForm = "power"
-    exponents: SurfaceExponents = field(default_factory=SurfaceExponents)
-    reference: SignalShape = SignalShape("sine", (1, 1))
-    base_motion: SignalShape = SignalShape("none", (0, 0, 0))
-    initial_motor: MotorStart = "unloaded"
-    drive: DriveKind = "elastic"
-    start: JointStart = "given"
-    integrator: str = "rk4"
-    effects: tuple[str, ...] = ()
-    controller: str = "terminal_sliding"
-
-
-@dataclass(frozen=True, slots=True)
-class TableLayout:
-    """Where a table stands in the data vector d: d[start] is tau (s from the knot), then four coefficients a channel.
-
-    channels: indices of the signal's coordinates that have a column, in the order of their coefficients.
-    """
-
-    signal: Literal["reference", "base_motion"]
-    start: int
-    channels: tuple[int, ...]
+from springline.model.signal_symbols import SignalSymbols
+from springline.model.structure import Structure
+from springline.model.symbolic import as_written
 
 
 def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tuple[Parameter, ...]:
@@ -159,15 +117,12 @@ class System:
             self._control |= vector.table(f"control.{table}", own, self.joints)
 
         self.t = ca.SX.sym("t")
-        self._d: list[ca.SX] = []
-        self.tables: tuple[TableLayout, ...] = ()
-        reference = self._signals(
-            "reference", self.structure.reference, [(j.name, j.unit) for j in self.joints], vector
-        )
-        base = self._signals("base_motion", self.structure.base_motion, [(c.key, c.unit) for c in COORDINATES], vector)
+        symbols = SignalSymbols(self.t, vector)
+        reference = symbols.signal("reference", self.structure.reference, [(j.name, j.unit) for j in self.joints])
+        base = symbols.signal("base_motion", self.structure.base_motion, [(c.key, c.unit) for c in COORDINATES])
+        self.tables, self.d = symbols.tables, symbols.d
         self._signal_expressions = ca.vertcat(*signals.stack(reference), *signals.stack(base))
         self._initial = self._initial_values(vector)
-        self.d = ca.vertcat(*self._d)
         self.p = vector.sx
         self.slots: tuple[Slot, ...] = tuple(vector.slots)
 
@@ -191,83 +146,6 @@ class System:
             twice = [name for name in names if names.count(name) > 1]
             if twice:
                 raise ValueError(f"mechanism {self.mechanism.name}: two numbers would be called {twice[0]!r}")
-
-    # Parameters of signals and start
-
-    def _signals(
-        self,
-        table: Literal["reference", "base_motion"],
-        shape: SignalShape,
-        coordinates: list[tuple[str, str]],
-        vector: ParameterVector,
-    ) -> list[Signal]:
-        """Expressions of one vector signal; appends its parameters to `vector` or its data to d."""
-        if shape.kind == "none":
-            return [CONSTANT_ZERO] * len(coordinates)
-        if shape.kind == "table":
-            return self._table(table, shape, [key for key, _ in coordinates])
-        one = self._via_points if shape.kind == "polynomial" else self._sines
-        return [
-            one(table, key, unit, count, vector) for (key, unit), count in zip(coordinates, shape.terms, strict=True)
-        ]
-
-    def _table(
-        self, table: Literal["reference", "base_motion"], shape: SignalShape, coordinates: list[str]
-    ) -> list[Signal]:
-        tau = ca.SX.sym(f"{table}_tau")
-        channels = tuple(i for i, count in enumerate(shape.terms) if count)
-        start = sum(symbol.numel() for symbol in self._d)
-        self.tables += (TableLayout(table, start, channels),)
-        blocks = {i: ca.SX.sym(f"{table}_{coordinates[i]}", 4) for i in channels}
-        self._d += [tau, *blocks.values()]
-        return [signals.cubic(tau, blocks[i]) if i in blocks else CONSTANT_ZERO for i in range(len(coordinates))]
-
-    def _via_points(self, table: str, key: str, unit: str, count: int, vector: ParameterVector) -> Signal:
-        def points(name: str, unit: str, meaning: str) -> list[ca.SX]:
-            return [
-                vector.scalar(
-                    f"{table}.{key}.{name}.{k}", f"{table}_{key}_{name}_{k}", unit, 0.0, f"{meaning} {k} of {key}"
-                )
-                for k in range(count)
-            ]
-
-        return signals.via_points(self.t, points("t", "s", "time of via point"), points("q", unit, "via point"))
-
-    def _sines(self, table: str, key: str, unit: str, count: int, vector: ParameterVector) -> Signal:
-        offset = ca.SX(0)
-        dotted = f"{table}.{key}"
-        if table == "reference":
-            offset = vector.scalar(
-                f"{dotted}.offset", f"{table}_{key}_offset", unit, 0.0, f"offset of the {key} reference"
-            )
-            dotted += ".terms"
-        terms = [
-            (
-                vector.scalar(
-                    f"{dotted}.{k}.amplitude",
-                    f"{table}_{key}_{k}_amplitude",
-                    unit,
-                    0.0,
-                    f"amplitude of {key} term {k}",
-                ),
-                vector.scalar(
-                    f"{dotted}.{k}.omega",
-                    f"{table}_{key}_{k}_omega",
-                    "rad/s",
-                    0.0,
-                    f"angular frequency of {key} term {k}",
-                ),
-                vector.scalar(
-                    f"{dotted}.{k}.phase",
-                    f"{table}_{key}_{k}_phase",
-                    "rad",
-                    0.0,
-                    f"phase of {key} term {k}",
-                ),
-            )
-            for k in range(count)
-        ]
-        return signals.sine_sum(self.t, offset, terms)
 
     def _initial_values(self, vector: ParameterVector) -> dict[str, ca.SX]:
         """Symbols of the [initial] table, n x 1 each."""

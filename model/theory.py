@@ -12,7 +12,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from springline.model.sliding import SurfaceExponents
+from springline.model.control import SurfaceExponents
 
 Vector = NDArray[np.float64]
 

@@ -15,12 +15,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from springline.benchmarks import against, harness, math_speed, problem, roofline, same_bits, work_precision
+from springline.benchmarks import against, command, harness, math_speed, problem, roofline, same_bits, work_precision
+from springline.benchmarks import report as bench
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, handwritten_c, ours
-from springline.codegen.kernel import KernelOptions, kernel
-from springline.runner import bench
-from springline.runner.commands import bench as command
+from springline.codegen.kernel.compiled import kernel
+from springline.codegen.kernel.spec import KernelOptions
 
 TINY = harness.Effort(
     rounds=1, sample=1e-3, adaptive=problem.QUANTUM, compared=problem.QUANTUM, comparison=1e-3, compilers=False

@@ -19,14 +19,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
-from springline.codegen.toolchain import find_compiler
-from springline.runner import plots
-from springline.runner import scenario as scenarios
-from springline.runner import sweep as sweeps
+from springline.codegen.kernel.toolchain import find_compiler
 from springline.runner.cli import app
-from springline.runner.locate import kind_of
+from springline.runner.scenario import scenario as scenarios
+from springline.runner.scenario.locate import kind_of
+from springline.runner.sweep import sweep as sweeps
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "examples/README.md"]
@@ -104,9 +104,13 @@ def shorten(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(whole, scenario=short(whole.scenario))
 
     # tests/runner/test_plots.py looks at the figures, whose drawing would take most of the time.
-    monkeypatch.setattr(plots, "figure_files", lambda name, figure: {f"{name}.png": b"", f"{name}.svg": b""})
-    monkeypatch.setattr(scenarios, "load_scenario", loaded)
-    monkeypatch.setattr(sweeps, "load_sweep", swept)
+    def files(name: str, _: Figure) -> dict[str, bytes]:
+        return {f"{name}.png": b"", f"{name}.svg": b""}
+
+    monkeypatch.setattr("springline.runner.report.figure_files", files)
+    monkeypatch.setattr("springline.runner.sweep.load_sweep", swept)
+    for face in ("springline", "springline.runner", "springline.runner.scenario"):
+        monkeypatch.setattr(f"{face}.load_scenario", loaded)
 
 
 def run_shell(block: Block) -> None:
@@ -215,7 +219,15 @@ INLINE = [
     for code in dict.fromkeys(re.findall(rf"(?<!`)`((?:{'|'.join(PROGRAMS)})\s[^`]+)`", page.read_text("utf-8")))
 ]
 # Words that stand for something; whatever else is written large is a command's own word.
-PLACEHOLDERS = {"SCENARIO": "paper/nominal", "DIR": "out", "SWEEP": "gains", "N": "1", "NAMES": "all", "NAME": "arm", "FILE": "law.py"}
+PLACEHOLDERS = {
+    "SCENARIO": "paper/nominal",
+    "DIR": "out",
+    "SWEEP": "gains",
+    "N": "1",
+    "NAMES": "all",
+    "NAME": "arm",
+    "FILE": "law.py",
+}
 
 
 @pytest.mark.parametrize("code", INLINE)

@@ -16,7 +16,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("benchmarks", "codegen", "generated", "model", "runner")
-CARRIED = (*PACKAGES, "docs", "examples", "tests")
+FACE = {"__init__.py", "__init__.pyi", "py.typed"}
+CARRIED = (*PACKAGES, "docs", "examples", "springline", "tests")
 Once = Callable[[str, Callable[[Path], object]], Path]
 PYTHON = [sys.executable, "-I"]  # isolated: neither the current folder nor PYTHONPATH may help
 
@@ -87,13 +88,13 @@ def test_wheel_holds_springline_and_nothing_else(wheel: set[str]) -> None:
     tops = {name.split("/")[0] for name in wheel}
     assert len(tops) == 2
     assert tops - {"springline"} == {top for top in tops if top.endswith(".dist-info")}
-    assert {name.split("/")[1] for name in wheel if name.startswith("springline/")} == set(PACKAGES)
+    assert {name.split("/")[1] for name in wheel if name.startswith("springline/")} == {*PACKAGES, *FACE}
 
 
 def test_wheel_carries_every_shipped_file(wheel: set[str]) -> None:
     """Python, C, scenarios and generated files, each where its package expects it; no file is forgotten."""
     shipped = {name.removeprefix("springline/") for name in wheel if name.startswith("springline/")}
-    assert shipped == tree(*PACKAGES)
+    assert shipped == tree(*PACKAGES) | FACE
     for needed in (
         "codegen/runtime/loop.c",
         "runner/scenarios/paper/nominal.toml",
@@ -113,9 +114,10 @@ def test_wheel_metadata(dist: Path, wheel: set[str]) -> None:
     assert path.name.endswith("-py3-none-any.whl")
     assert (metadata["Name"], metadata["License-Expression"]) == ("springline", "MIT")
     assert scripts["console_scripts"]["springline"] == "springline.runner.cli:main"
+    assert dict(scripts["springline.commands"]) == {"bench": "springline.benchmarks.command:bench"}
     assert f"{folder}/licenses/LICENSE" in wheel
     required = {line.split(";")[0].rstrip("0123456789.>=") for line in metadata.get_all("Requires-Dist", ())}
-    assert {"casadi", "matplotlib", "numpy", "pyarrow", "pydantic", "scipy", "typer"} <= required
+    assert {"casadi", "lazy_loader", "matplotlib", "numpy", "pyarrow", "pydantic", "scipy", "typer"} <= required
     assert set(metadata.get_all("Provides-Extra", ())) == {"bench", "compiler", "dev", "distributed", "fmu"}
 
 
@@ -153,5 +155,8 @@ def test_installed_command(installed: Path, tmp_path: Path) -> None:
     call = f"import sys; sys.path.insert(0, {os.fspath(installed)!r}); from springline.runner.cli import main"
     version = run(*PYTHON, "-c", f"{call}; sys.argv[1:] = ['--version']; main()", cwd=tmp_path)
     assert "0.1.0" in version
+    face = "import springline as sl; print(sl.__version__, sl.batch)"
+    place = f"import sys; sys.path.insert(0, {os.fspath(installed)!r}); "
+    assert run(*PYTHON, "-c", place + face, cwd=tmp_path).startswith("0.1.0 <function batch")
     listing = f"{call}; sys.argv[1:] = ['list', 'scenarios', '--json']; main()"
     assert "paper/nominal" in run(*PYTHON, "-c", listing, cwd=tmp_path)

@@ -10,7 +10,7 @@ import numpy as np
 
 from springline.benchmarks import problem
 from springline.benchmarks.contenders import casadi_model
-from springline.codegen import toolchain
+from springline.codegen.kernel import toolchain
 
 FLAGS = ("-O3", "-std=gnu99", "-ffp-contract=fast", "-Wno-unused-parameter", "-lm")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from springline.benchmarks import problem
-from springline.codegen import toolchain
+from springline.codegen.kernel import toolchain
 
 SOURCE = Path(__file__).with_name("handwritten.c")
 FLAGS = ("-O3", "-std=gnu99", "-ffp-contract=fast", "-fno-trapping-math", "-lm")

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from springline.benchmarks import problem
-from springline.codegen import toolchain
-from springline.codegen.kernel import ONE_RUN, KernelOptions, KernelSpec, LoopSettings, kernel
-from springline.codegen.kernel_source import best_flags
-from springline.model.system import SignalShape, Structure, System
+from springline.codegen.kernel import ONE_RUN, KernelOptions, KernelSpec, LoopSettings, best_flags, kernel, toolchain
+from springline.model.structure import SignalShape, Structure
+from springline.model.system import System
 
 NAME = "springline"
 STRUCTURE = Structure(base_motion=SignalShape("sine", (1, 0, 0)))

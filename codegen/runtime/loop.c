@@ -383,7 +383,7 @@ static void run_packs(sl_pack *packs, int count, const sl_job *job) {
 /* ---- entry points -------------------------------------------------------------------------------------- */
 
 /*
- * How many runs go side by side, and the sizes that a caller must have the same, in the order of _LAYOUT in kernel.py: of
+ * How many runs go side by side, and the sizes that a caller must have the same, in the order of _LAYOUT in compiled.py: of
  * sl_job and sl_table in bytes, of what a run takes and gives in numbers. Writes no more than `room` of them, and returns
  * how many there are.
  */

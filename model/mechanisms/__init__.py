@@ -1,11 +1,5 @@
-"""Mechanisms by name. A new one is one module with two energies and one line here, or a user's own file."""
+"""Mechanisms: what one has to tell, and the packaged ones."""
 
-from __future__ import annotations
+import lazy_loader
 
-from springline.model.mechanism import Mechanism, check_mechanism
-from springline.model.mechanisms.transfer_manipulator import TransferManipulator
-from springline.model.registry import Registry
-
-MECHANISMS: Registry[Mechanism] = Registry(
-    Mechanism, {item.name: item for item in (TransferManipulator(),)}, check_mechanism
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from springline.model.mechanism import Mechanism
+from springline.model.mechanisms.mechanism import Mechanism
 from springline.model.parameters import POSITIVE, REAL, Joint, Parameter, Values
 from springline.model.signals import SineTerm
 

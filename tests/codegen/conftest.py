@@ -10,9 +10,9 @@ import pytest
 from fmi_client import SAMPLED, Client, Values, arm
 from numpy.typing import NDArray
 
-from springline.codegen.fmu import Settings
-from springline.codegen.program import Program, program
-from springline.model.system import SignalShape, Structure
+from springline.codegen.export.fmu.settings import Settings
+from springline.codegen.program.frozen import Program, program
+from springline.model.structure import SignalShape, Structure
 
 NOMINAL = {
     "reference.lift.terms.0.amplitude": 1.0,

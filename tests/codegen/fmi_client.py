@@ -12,9 +12,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen.fmu import Settings, fmu
-from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, Table, kernel
-from springline.codegen.program import Program
+from springline.codegen.export.fmu.archive import fmu
+from springline.codegen.export.fmu.settings import Settings
+from springline.codegen.kernel.compiled import kernel
+from springline.codegen.kernel.settings import LoopSettings
+from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.codegen.program.frozen import Program
+from springline.codegen.program.tables import SignalTable
 from springline.model.base import COORDINATES
 
 STEP, PERIOD, DURATION = 1e-4, 1e-3, 0.3
@@ -123,7 +127,7 @@ def own_run(
     steps: int = round(DURATION / STEP),
     every: int = EVERY,
     start: float = 0.0,
-    tables: Sequence[Table] = (),
+    tables: Sequence[SignalTable] = (),
 ) -> NDArray[np.float64]:
     """Our own loop's rows, without t."""
     loop = kernel(KernelSpec(of.system.structure, sampled, options=KernelOptions(width=1, groups=1)))

@@ -13,11 +13,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from springline.codegen import baking, toolchain
-from springline.codegen.api import generate_files
-from springline.codegen.baking import UnexpectedCode, print_baked, split_parameters
-from springline.codegen.export import MODEL_FUNCTIONS, bind
-from springline.codegen.manifest import canonical_json, check_tree, summary
+from springline.codegen.export.bound import MODEL_FUNCTIONS, bind
+from springline.codegen.export.c import baking
+from springline.codegen.export.c.baking import UnexpectedCode, print_baked, split_parameters
+from springline.codegen.export.c.tree import generate_files
+from springline.codegen.files.canonical import canonical_json
+from springline.codegen.files.manifest import check_tree, summary
+from springline.codegen.kernel import toolchain
 from springline.runner import load_scenario
 
 ROOT = Path(__file__).parents[2]
@@ -95,9 +97,9 @@ def test_no_placeholder_is_left(nominal: tuple[dict[str, bytes], dict]) -> None:
 
 def test_the_same_bytes_from_another_process_and_folder(nominal: tuple[dict[str, bytes], dict], tmp_path: Path) -> None:
     code = (
-        "import hashlib\nfrom springline.codegen.api import generate_files\n"
-        "from springline.codegen.export import bind\n"
-        "from springline.codegen.manifest import canonical_json\nfrom springline.runner import load_scenario\n"
+        "import hashlib\nfrom springline.codegen.export.c.tree import generate_files\n"
+        "from springline.codegen.export.bound import bind\n"
+        "from springline.codegen.files.manifest import canonical_json\nfrom springline.runner import load_scenario\n"
         "s = load_scenario('paper/nominal')\n"
         "files, manifest = generate_files(bind(s.structure(), s.values(), tunable='none'))\n"
         "content = {path: hashlib.sha256(text).hexdigest() for path, text in files.items()}\n"

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from springline.codegen.c_tokens import tokens
-from springline.codegen.kernel_source import runtime_sources
+from springline.codegen.kernel.c_tokens import tokens
+from springline.codegen.kernel.source import runtime_sources
 
 
 @pytest.mark.parametrize(

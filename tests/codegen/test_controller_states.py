@@ -14,16 +14,21 @@ from fmi_client import Client, client_library
 from scipy.integrate import solve_ivp
 from test_one_loop import structure_of, values_of
 
-from springline.codegen.api import generate_files
-from springline.codegen.export import bind
-from springline.codegen.fmu import Settings, fmu
-from springline.codegen.kernel import METRICS, KernelOptions, KernelSpec, LoopSettings, Runs, kernel
-from springline.codegen.manifest import write_tree
-from springline.model.control import CONTROLLERS
-from springline.model.controller import ArmModel, Control, Controller, Rates
+from springline.codegen.export.bound import bind
+from springline.codegen.export.c.tree import generate_files
+from springline.codegen.export.fmu.archive import fmu
+from springline.codegen.export.fmu.settings import Settings
+from springline.codegen.files.manifest import write_tree
+from springline.codegen.kernel.compiled import kernel
+from springline.codegen.kernel.runs import METRICS, Runs
+from springline.codegen.kernel.settings import LoopSettings
+from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.model.control.controller import ArmModel, Control, Controller, Rates
+from springline.model.control.registry import CONTROLLERS
 from springline.model.parameters import NON_NEGATIVE, POSITIVE, Parameter, Values
 from springline.model.quantities import SIGMA, Quantity
-from springline.model.system import Structure, System
+from springline.model.structure import Structure
+from springline.model.system import System
 
 pytestmark = pytest.mark.usefixtures("other_arms")
 

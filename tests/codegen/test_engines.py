@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen import lanes, toolchain
-from springline.codegen.kernel import Engine, KernelOptions, KernelSpec, LoopSettings, Runs, compile_kernel
-from springline.codegen.operations import UnprintableOperation
-from springline.codegen.program import Program
-from springline.model.linear import as_written
+from springline.codegen.kernel import lanes, toolchain
+from springline.codegen.kernel.compiled import compile_kernel
+from springline.codegen.kernel.runs import Runs
+from springline.codegen.kernel.settings import LoopSettings
+from springline.codegen.kernel.spec import Engine, KernelOptions, KernelSpec
+from springline.codegen.program.frozen import Program
+from springline.codegen.program.operations import UnprintableOperation
+from springline.model.symbolic.linear import as_written
 
 Values = Callable[..., NDArray[np.float64]]
 SHORT = LoopSettings(steps=400, step=1e-4, output_every=50)

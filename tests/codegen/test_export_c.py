@@ -16,12 +16,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springline.codegen import typed
-from springline.codegen.api import generate_files
-from springline.codegen.export import bind
-from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
-from springline.codegen.manifest import write_tree
-from springline.codegen.typed import STATUS
+from springline.codegen.export.bound import bind
+from springline.codegen.export.c import interface
+from springline.codegen.export.c.interface import STATUS
+from springline.codegen.export.c.tree import generate_files
+from springline.codegen.files.manifest import write_tree
+from springline.codegen.kernel.compiled import kernel
+from springline.codegen.kernel.settings import LoopSettings
+from springline.codegen.kernel.spec import KernelOptions, KernelSpec
 from springline.model.parameters import Slot
 from springline.model.quantities import BASE, REFERENCE, SATURATED, SIGMA, E, U, entries
 from springline.runner import load_scenario
@@ -378,7 +380,7 @@ def test_header_and_readme_say_what_every_field_is(export: Folder) -> None:
 
 
 def test_a_meaning_that_makes_a_line_too_long_is_left_to_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(typed, "_LINE", 64)
+    monkeypatch.setattr(interface, "_LINE", 64)
     scenario = load_scenario("paper/nominal")
     files, _ = generate_files(bind(scenario.structure(), scenario.values()))
     header, readme = files["include/springline.h"].decode(), files["README.md"].decode()

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springline.codegen import toolchain
+from springline.codegen.kernel import toolchain
 
 HEADER = (Path(__file__).parents[2] / "codegen" / "runtime" / "sl_mathf.h").read_text()
 ROOTS = ("sqrt", "sqrt_soft", "pow_p1_3", "pow_m1_3", "pow_p2_3", "pow_m2_3", "pow_p1_2", "pow_m1_2")

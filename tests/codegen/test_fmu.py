@@ -40,12 +40,13 @@ from fmi_client import (
 )
 from numpy.typing import NDArray
 
-from springline.codegen import toolchain
-from springline.codegen.fmu import Settings, fmu
-from springline.codegen.fmu_units import base_exponents
-from springline.codegen.kernel import Table
-from springline.codegen.program import Program, program
-from springline.model.system import SignalShape, Structure
+from springline.codegen.export.fmu.archive import fmu
+from springline.codegen.export.fmu.settings import Settings
+from springline.codegen.export.fmu.units import base_exponents
+from springline.codegen.kernel import toolchain
+from springline.codegen.program.frozen import Program, program
+from springline.codegen.program.tables import SignalTable
+from springline.model.structure import SignalShape, Structure
 
 # --- what is in the file ---------------------------------------------------------------------------------
 
@@ -230,7 +231,7 @@ def test_simulate_fmu_with_another_parameter(build: Build, shaken: Program, valu
 def test_table_signals(open_fmu: Open, values_of: Values, tmp_path: Path) -> None:
     moved = program(Structure(base_motion=SignalShape("table", (1, 0, 1))))
     random = np.random.default_rng(474)
-    table = Table(-0.05, 0.0625, True, random.normal(0.0, 0.1, (4, 2, 4)))
+    table = SignalTable(-0.05, 0.0625, True, random.normal(0.0, 0.1, (4, 2, 4)))
     values = values_of(moved)
     path = tmp_path / "table.fmu"
     ending = replace(SAMPLED, until=DURATION)
@@ -504,5 +505,5 @@ def test_unusable_arguments(shaken: Program, values_of: Values) -> None:
             version=3,
             identifier="a",
             name="a",
-            tables=[Table(0.0, 1.0, False, np.zeros((1, 1, 4)))],
+            tables=[SignalTable(0.0, 1.0, False, np.zeros((1, 1, 4)))],
         )

@@ -28,10 +28,10 @@ from fmi_client import (
 )
 from numpy.typing import NDArray
 
-from springline.codegen.fmu import fmu
-from springline.codegen.kernel import Table
-from springline.codegen.program import Program, program
-from springline.model.system import SignalShape, Structure
+from springline.codegen.export.fmu.archive import fmu
+from springline.codegen.program.frozen import Program, program
+from springline.codegen.program.tables import SignalTable
+from springline.model.structure import SignalShape, Structure
 
 UNIX = 1.7e9  # s; doubles there are 2.4e-7 s apart
 STARTS = (0.25, -3.0, 1e6, UNIX, UNIX + 0.3)
@@ -254,7 +254,7 @@ def test_called_as_c_calls_it(build: Build, open_fmu: Open, version: int) -> Non
 @pytest.mark.parametrize("start", [0.0, UNIX])
 def test_tables_count_from_the_start(open_fmu: Open, values_of: Values, tmp_path: Path, start: float) -> None:
     moved = program(Structure(base_motion=SignalShape("table", (1, 0, 1))))
-    table = Table(0.0, 0.0625, False, np.random.default_rng(474).normal(0.0, 0.1, (5, 2, 4)))
+    table = SignalTable(0.0, 0.0625, False, np.random.default_rng(474).normal(0.0, 0.1, (5, 2, 4)))
     values = values_of(moved)
     path = tmp_path / "tabled.fmu"
     path.write_bytes(

@@ -6,10 +6,12 @@ from typing import Any
 
 import pytest
 
-from springline.codegen.kernel import KernelOptions, KernelSpec, kernel
-from springline.codegen.kernel_source import print_kernel
-from springline.codegen.program import program
-from springline.model.system import SignalShape, Structure, System
+from springline.codegen.kernel.compiled import kernel
+from springline.codegen.kernel.source import print_kernel
+from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.codegen.program.frozen import program
+from springline.model.structure import SignalShape, Structure
+from springline.model.system import System
 
 STRUCTURE = Structure()
 KEYS = [slot.key for slot in System(STRUCTURE).slots]

@@ -11,28 +11,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen import kernel as kernel_module
-from springline.codegen import kernel_source, toolchain
-from springline.codegen.job import JOB, Job
-from springline.codegen.kernel import (
-    METRICS,
-    MOST_STEPS,
-    STATUS,
-    Kernel,
-    KernelOptions,
-    KernelSpec,
-    LayoutError,
-    LoopSettings,
-    Runs,
-    Table,
-    Watch,
-    compile_kernel,
-    quantity_name,
-)
-from springline.codegen.program import Program, program
+from springline.codegen.kernel import compiled as kernel_module
+from springline.codegen.kernel import source as kernel_source
+from springline.codegen.kernel import toolchain
+from springline.codegen.kernel.compiled import Kernel, LayoutError, Watch, compile_kernel
+from springline.codegen.kernel.job import JOB, Job
+from springline.codegen.kernel.runs import METRICS, STATUS, Runs, quantity_name
+from springline.codegen.kernel.settings import MOST_STEPS, LoopSettings
+from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.codegen.program.frozen import Program, program
+from springline.codegen.program.tables import SignalTable
 from springline.model import quantities
-from springline.model.linear import as_written
-from springline.model.system import SignalShape, Structure
+from springline.model.structure import SignalShape, Structure
+from springline.model.symbolic.linear import as_written
 
 Values = Callable[..., NDArray[np.float64]]
 # Low levels of optimisation, for they change no bit: test_engines.py compares them with all others.
@@ -61,7 +52,7 @@ def run(
     settings: LoopSettings,
     *,
     sampled: bool = False,
-    tables: tuple[Table, ...] = (),
+    tables: tuple[SignalTable, ...] = (),
     options: KernelOptions = PLAIN,
 ) -> Runs:
     return compiled(base, sampled=sampled, options=options).run(np.atleast_2d(values), settings, tables)
@@ -392,7 +383,7 @@ def test_control_that_overflows_later_ends_the_run_there(
     tabled = program(Structure(reference=SignalShape("table", (1, 0))))
     pieces = np.zeros((4, 1, 4))
     pieces[2:, 0, 0] = 1e120
-    tables = (Table(0.0, 0.01, False, pieces),)
+    tables = (SignalTable(0.0, 0.01, False, pieces),)
     values = values_of(tabled, LIMITS)
     settings = LoopSettings(400, 1e-4, hold=8, output_every=1)
     result = run(tabled, values, settings, sampled=sampled, tables=tables, options=options)
@@ -420,18 +411,18 @@ def test_control_that_overflows_at_the_end_is_told_too(sampled: bool, values_of:
         values_of(tabled, LIMITS),
         LoopSettings(100, 1e-4, hold=50),
         sampled=sampled,
-        tables=(Table(0.0, 0.01, False, pieces),),
+        tables=(SignalTable(0.0, 0.01, False, pieces),),
     )
     assert STATUS[result.status[0]] == "diverged"
     assert result.end_time[0] == 0.01
     assert np.isnan(result.metrics[0, :, METRICS.index("settling_time")]).all()
 
 
-def parabola(rate: float, knots: int, dt: float, **options: object) -> Table:
+def parabola(rate: float, knots: int, dt: float, **options: object) -> SignalTable:
     """y = rate t^2 / 2 on the shake, exactly, as cubic pieces."""
     t = np.arange(knots) * dt
     pieces = np.stack([0.5 * rate * t**2, rate * t, np.full(knots, 0.5 * rate), np.zeros(knots)], axis=1)
-    return Table(0.0, dt, bool(options.get("periodic", False)), pieces[:, None, :])
+    return SignalTable(0.0, dt, bool(options.get("periodic", False)), pieces[:, None, :])
 
 
 @pytest.mark.parametrize("options", [PLAIN, WIDE], ids=["scalar", "lanes"])
@@ -573,7 +564,7 @@ def test_integers_of_numpy_are_taken_as_they_are(shaken: Program, values_of: Val
 )
 def test_tables_without_an_interval_to_look_up_are_refused(t0: float, dt: float, shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="of a table"):
-        Table(t0, dt, False, np.zeros(shape))
+        SignalTable(t0, dt, False, np.zeros(shape))
 
 
 def test_c_structures_take_no_number_that_they_would_change() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from springline.codegen.names import check_files, check_prefix
+from springline.codegen.export.names import check_files, check_prefix
 
 
 def accepted(prefix: str) -> bool:

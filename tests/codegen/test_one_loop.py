@@ -14,17 +14,21 @@ import numpy as np
 import pytest
 from fmi_client import Client, client_library
 
-from springline.codegen import fmu as fmu_module
-from springline.codegen.api import generate_files
-from springline.codegen.export import bind
-from springline.codegen.fmu import Settings, fmu
-from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
-from springline.codegen.manifest import write_tree
-from springline.codegen.program import program
+from springline.codegen.export.bound import bind
+from springline.codegen.export.c.tree import generate_files
+from springline.codegen.export.fmu import archive as fmu_module
+from springline.codegen.export.fmu.archive import fmu
+from springline.codegen.export.fmu.settings import Settings
+from springline.codegen.files.manifest import write_tree
+from springline.codegen.kernel.compiled import kernel
+from springline.codegen.kernel.settings import LoopSettings
+from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.codegen.program.frozen import program
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS
 from springline.model.quantities import Q1, Quantity
-from springline.model.system import SignalShape, Structure, System
+from springline.model.structure import SignalShape, Structure
+from springline.model.system import System
 
 pytestmark = pytest.mark.usefixtures("other_arms")
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen import toolchain
-from springline.codegen.casadi_c import print_functions
-from springline.codegen.kernel_source import runtime_sources
-from springline.codegen.program import Program
+from springline.codegen.kernel import toolchain
+from springline.codegen.kernel.source import runtime_sources
+from springline.codegen.program.casadi_c import print_functions
+from springline.codegen.program.frozen import Program
 
 Values = Callable[..., NDArray[np.float64]]
 SAMPLES = 1000

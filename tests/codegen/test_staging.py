@@ -4,8 +4,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from springline.codegen.program import Program, count_operations
-from springline.codegen.staging import split
+from springline.codegen.program.frozen import Program, count_operations
+from springline.codegen.program.staging import split
 
 UNARY = [
     ca.sin,

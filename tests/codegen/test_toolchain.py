@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import pytest
 
-from springline.codegen import toolchain
-from springline.codegen.toolchain import (
+from springline.codegen.kernel import toolchain
+from springline.codegen.kernel.toolchain import (
     Compiler,
     ToolchainError,
     build_library,

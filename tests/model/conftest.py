@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from springline.model.system import Structure, System
+from springline.model.structure import Structure
+from springline.model.system import System
 
 Array = np.ndarray
 

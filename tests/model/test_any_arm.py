@@ -5,7 +5,8 @@ import pytest
 
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import Joint, Parameter
-from springline.model.system import SignalShape, Structure, System, control_parameters
+from springline.model.structure import SignalShape, Structure
+from springline.model.system import System, control_parameters
 
 pytestmark = pytest.mark.usefixtures("other_arms")
 

@@ -7,8 +7,8 @@ import pkgutil
 
 import pytest
 
-from springline.model.mechanism import Mechanism
-from springline.model.sliding import Law
+from springline.model.control.reaching import Law
+from springline.model.mechanisms.mechanism import Mechanism
 
 PACKAGES = ("springline.model", "springline.codegen", "springline.runner")
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from springline.model.control.reaching import LAWS
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import (
     EVEN,
@@ -23,8 +24,8 @@ from springline.model.parameters import (
     ParameterVector,
     Values,
 )
-from springline.model.sliding import LAWS
-from springline.model.system import SignalShape, Structure, System
+from springline.model.structure import SignalShape, Structure
+from springline.model.system import System
 
 JOINTS = (Joint("lift", "m", "N"), Joint("rotation", "rad", "N m"))
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.interpolate import CubicSpline, make_interp_spline
 
 from springline.model.signals import cubic, sine_sum, via_points
-from springline.model.system import SignalShape, Structure
+from springline.model.structure import SignalShape, Structure
 
 REFERENCE = {"reference.lift.terms.0.amplitude": 1.0, "reference.lift.terms.0.omega": np.pi}
 

@@ -7,13 +7,15 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from springline.model.control import TerminalSliding
-from springline.model.controller import ArmModel
+from springline.model.control.controller import ArmModel
+from springline.model.control.reaching import LAWS, Law, reaching_rate
+from springline.model.control.sliding import SurfaceExponents, surface
+from springline.model.control.terminal_sliding import TerminalSliding
 from springline.model.drive import DRIVES
 from springline.model.lagrange import equations_of_motion
 from springline.model.parameters import Values
-from springline.model.sliding import LAWS, Law, SurfaceExponents, reaching_rate, surface
-from springline.model.system import Structure, System
+from springline.model.structure import Structure
+from springline.model.system import System
 
 EXPONENTS = [(3, 1, 1, 3), (5, 3, 3, 5), (7, 5, 5, 7), (5, 1, 1, 5), (7, 3, 5, 9), (9, 7, 1, 9), (5, 3, 1, 11)]
 LAW_NAMES = ["variable_power_log", "double_power", "power"]

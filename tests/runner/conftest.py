@@ -6,12 +6,13 @@ from typing import Any
 
 import pytest
 
-from springline.codegen import api, kernel_source, toolchain
-from springline.codegen.export import Export
+from springline.codegen.export.bound import Export
+from springline.codegen.export.c import tree
+from springline.codegen.kernel import source, toolchain
 
 Generated = tuple[dict[str, bytes], dict[str, Any]]
 
-_generate_files = api.generate_files
+_generate_files = tree.generate_files
 _GENERATED: dict[object, Generated] = {}
 
 
@@ -35,6 +36,6 @@ def _no_work_that_other_tests_look_at() -> Iterator[None]:
     which codegen/test_api.py does.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kernel_source, "best_flags", lambda compiler: ("-O1",))
-        patch.setattr(api, "generate_files", _generated_once)
+        patch.setattr(source, "best_flags", lambda compiler: ("-O1",))
+        patch.setattr(tree, "generate_files", _generated_once)
         yield

@@ -27,23 +27,27 @@ from pyarrow import parquet
 from scipy.stats import spearmanr
 from typer.testing import CliRunner
 
-from springline.codegen.toolchain import ToolchainError
+from springline.codegen.kernel.toolchain import ToolchainError
 from springline.runner import batch, load_scenario, simulate
-from springline.runner.batch import Cluster, Tally, Threads, dataset_bytes, estimate, open_pool, run_sweep, versions
 from springline.runner.cli import app
-from springline.runner.commands.batch import _progress, size_text, time_text
-from springline.runner.dataset import Dataset, Folder, place, read_dataset
-from springline.runner.errors import InputError
-from springline.runner.locate import packaged_sweeps
-from springline.runner.plan import Plan
-from springline.runner.quantiles import Quantiles
-from springline.runner.replay import stored_plan
-from springline.runner.simulate import trajectory_schema
-from springline.runner.storage import parquet_bytes
-from springline.runner.summary import QUANTILES, summarize
-from springline.runner.sweep import load_sweep
-from springline.runner.sweep_plots import rank_correlation, summary_figures
-from springline.runner.work import parcel, perform_parcel
+from springline.runner.cli.amounts import size_text, time_text
+from springline.runner.cli.commands.batch import _progress
+from springline.runner.files.errors import InputError
+from springline.runner.files.storage import parquet_bytes
+from springline.runner.run.columns import trajectory_schema
+from springline.runner.scenario.locate import packaged_sweeps
+from springline.runner.sweep.dataset import Dataset, read_dataset
+from springline.runner.sweep.figures import rank_correlation, summary_figures
+from springline.runner.sweep.forecast import dataset_bytes, estimate
+from springline.runner.sweep.places import Folder, place
+from springline.runner.sweep.plan import Plan
+from springline.runner.sweep.pool import Cluster, Threads, open_pool
+from springline.runner.sweep.quantiles import Quantiles
+from springline.runner.sweep.replay import stored_plan
+from springline.runner.sweep.running import Tally, run_sweep, versions
+from springline.runner.sweep.summary import QUANTILES, summarize
+from springline.runner.sweep.sweep import load_sweep
+from springline.runner.sweep.work import parcel, perform_parcel
 
 # Steps that cost next to nothing; one kernel for most tests of this file and of test_dataset.py.
 SWEEP = """
@@ -277,7 +281,7 @@ def _parts(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("address", ["local:0", "local:x", "somewhere", "tcp://127.0.0.1:1"])
 def test_a_bad_scheduler_is_the_users_mistake(address: str, distributed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.import_module("springline.runner.batch"), "_ANSWER", "0.5s")
+    monkeypatch.setattr(importlib.import_module("springline.runner.sweep.pool"), "_ANSWER", "0.5s")
     with pytest.raises(InputError, match="--scheduler"), open_pool(None, address):
         pass
 
@@ -523,7 +527,7 @@ def test_a_sweep_larger_than_memory_or_disk_is_refused_before_it_starts(
     plan = Plan(load_sweep(sweep))
     columns = len(trajectory_schema(plan.groups[0].work.system))
     need = 2 * 8 * 7 * 3 * columns  # of a chunk of 64 runs each tenth, at rows 0, 10, 20
-    batch_module = importlib.import_module("springline.runner.batch")
+    batch_module = importlib.import_module("springline.runner.sweep.forecast")
     monkeypatch.setattr(batch_module, "memory", lambda: need - 1)
     done = command("batch", sweep, "-o", tmp_path / "data", "--jobs", 1)
     assert done.exit_code == 2
@@ -603,7 +607,7 @@ def test_dry_run_writes_nothing_and_its_size_is_about_right(sweep: Path, tmp_pat
 def test_a_long_sweep_says_so_before_it_starts(
     sweep: Path, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("springline.runner.commands.batch._LONG", 0.0)
+    monkeypatch.setattr("springline.runner.cli.commands.batch._LONG", 0.0)
     done = command("batch", sweep, "-o", tmp_path / "data", "--no-plot")
     assert done.exit_code == 0
     assert "this will take about" in done.stderr
@@ -722,7 +726,7 @@ def test_quantiles_are_exact_whatever_the_sample_that_figures_show(
         numbers = np.sort(table[column].drop_null().to_numpy())
         expected = [numbers[round(q * (len(numbers) - 1))] for q in QUANTILES] if len(numbers) else [math.nan] * 7
         assert np.array_equal(found.quantiles, expected, equal_nan=True), column
-    monkeypatch.setattr("springline.runner.summary._SHOWN", 100)
+    monkeypatch.setattr("springline.runner.sweep.summary._SHOWN", 100)
     sampled = summarize(plan, dataset)
     assert 50 < len(sampled.shown) < 200
     assert set(sampled.shown["run"].to_pylist()) < set(range(4000))
@@ -793,7 +797,7 @@ def test_sizes_and_times_are_for_people() -> None:
 
 def test_a_batch_beyond_memory_is_refused_before_it_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = load_scenario("paper/nominal", {"simulation.duration": 0.001})
-    monkeypatch.setattr(importlib.import_module("springline.runner.batch"), "memory", lambda: 100_000)
+    monkeypatch.setattr(importlib.import_module("springline.runner.sweep.arrays"), "memory", lambda: 100_000)
     assert len(batch(scenario, {"control.delta": np.full(50, 0.05)}, jobs=1)) == 50
     with pytest.raises(InputError, match=r"expected fewer runs.*5,000 runs take [\d,]+ bytes, and there are 100"):
         batch(scenario, {"control.delta": np.full(5000, 0.05)}, jobs=1)

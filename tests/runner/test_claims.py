@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from springline.model.theory import Margin, SettlingBounds
-from springline.runner.claims import Check, Evidence, Finding, Theory, judge
-from springline.runner.measured import Floats, Measured, first_time, lasting_time
-from springline.runner.paper_cases import CASES, JOINTS, LAWS
-from springline.runner.paper_claims import CLAIMS
+from springline.runner.paper.cases import CASES, JOINTS, LAWS
+from springline.runner.paper.claims import CLAIMS
+from springline.runner.paper.evidence import Check, Evidence, Finding, Theory, judge
+from springline.runner.paper.measured import Floats, Measured, first_time, lasting_time
 
 STEP = 1e-3
 T = STEP * np.arange(4001)

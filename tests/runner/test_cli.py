@@ -21,20 +21,21 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from springline import __version__
+from springline.benchmarks import command as bench
 from springline.benchmarks.contenders import CONTENDERS
-from springline.codegen.kernel import kernel
-from springline.codegen.manifest import Changes, write_tree
-from springline.model.sliding import LAWS
-from springline.runner import paper, terminal
-from springline.runner.claims import Check, Finding
-from springline.runner.cli import app
-from springline.runner.commands import bench
-from springline.runner.commands import run as run_command
-from springline.runner.errors import InputError
-from springline.runner.locate import packaged_scenarios, packaged_sweeps
-from springline.runner.scenario import load_scenario, parse_set
-from springline.runner.simulate import simulate
-from springline.runner.storage import read_table, units
+from springline.codegen.files.manifest import Changes, write_tree
+from springline.codegen.kernel.compiled import kernel
+from springline.model.control.reaching import LAWS
+from springline.runner.cli import app, terminal
+from springline.runner.cli.commands import run as run_command
+from springline.runner.files.errors import InputError
+from springline.runner.files.storage import read_table, units
+from springline.runner.paper import reproduction
+from springline.runner.paper.evidence import Check, Finding
+from springline.runner.run.simulation import simulate
+from springline.runner.scenario.locate import packaged_scenarios, packaged_sweeps
+from springline.runner.scenario.scenario import load_scenario, parse_set
 
 MAIN = "from springline.runner.cli import main; main()"
 FIGURES = {"tracking", "error", "force", "sliding", "springs", "steady_state", "base_motion"}
@@ -180,7 +181,7 @@ def test_csv_has_the_same_numbers_and_units_beside_it(results: Path) -> None:
 def test_run_prints_json_and_nothing_else() -> None:
     answer = json.loads(done("run", "short.toml", "-o", "out", "--no-plot", "--json"))
     assert list(answer) == ["command", "version", "status", "rows", "units"]
-    assert (answer["command"], answer["status"], answer["version"]) == ("run", "ok", terminal.version())
+    assert (answer["command"], answer["status"], answer["version"]) == ("run", "ok", __version__)
     metrics = read_table(Path("out/metrics.parquet"))
     assert answer["rows"] == metrics.to_pylist()
     assert answer["units"] == units(metrics)
@@ -546,7 +547,7 @@ def test_a_fault_of_springline_is_one_line_and_its_traceback_can_be_had(monkeypa
     def fail(_: str) -> dict[str, object]:
         raise KeyError("nobody expected this")
 
-    monkeypatch.setattr("springline.runner.commands.run.overrides", lambda *_: fail("x"))
+    monkeypatch.setattr("springline.runner.cli.commands.run.overrides", lambda *_: fail("x"))
     told = refused("run", "short.toml", code=1)
     assert re.fullmatch(r"Error: a fault of springline itself: KeyError: .*test_cli\.py, line \d+\).*\n", told)
     monkeypatch.setenv("SPRINGLINE_TRACEBACK", "1")
@@ -767,14 +768,14 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[object]:
         overrides: dict[str, object] | None = None,
         force: bool = False,
         progress: object = None,
-    ) -> paper.Reproduction:
+    ) -> reproduction.Reproduction:
         seen.extend([folder, groups, overrides, force])
         finding = Finding(3, "the new law is the fastest", (Check("yes", True),), ())
-        return paper.Reproduction(
+        return reproduction.Reproduction(
             folder, (finding,), ({**row, "printed": 0.76, "value": None, "change": None},), Changes((), ("a.png",))
         )
 
-    monkeypatch.setattr(paper, "reproduce", reproduce)
+    monkeypatch.setattr("springline.runner.paper.reproduce", reproduce)
     return seen
 
 
@@ -850,18 +851,18 @@ def test_doctor_says_what_is_missing() -> None:
 
 
 def test_version_and_help() -> None:
-    assert done("--version") == f"springline {terminal.version()}\n"
+    assert done("--version") == f"springline {__version__}\n"
     shown = done("--help")
     assert all(f"  {command} " in shown for command in ("run", "generate", "export", "reproduce", "list", "doctor"))
 
 
 def test_version_and_help_wait_for_no_library() -> None:
-    """CasADi, Arrow and Matplotlib take seconds to import."""
+    """CasADi, Arrow and Matplotlib take seconds to import; Rich is more than the help needs."""
     code = (
         "import sys; from springline.runner.cli import app\n"
         "try: app(['--help'])\n"
         "except SystemExit: pass\n"
-        "print(sorted({'casadi', 'matplotlib', 'pyarrow', 'scipy', 'pydantic'} & set(sys.modules)))"
+        "print(sorted({'casadi', 'matplotlib', 'pyarrow', 'scipy', 'pydantic', 'rich'} & set(sys.modules)))"
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.splitlines()[-1] == "[]"

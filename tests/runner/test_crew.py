@@ -8,10 +8,14 @@ from threading import Event
 import numpy as np
 import pytest
 
-from springline.codegen.kernel import ONE_RUN, STATUS, KernelSpec, LoopSettings, Runs, Watch, kernel
-from springline.model.system import Structure, System
-from springline.runner.crew import Crew, results
-from springline.runner.work import perform
+from springline.codegen.kernel.compiled import Watch, kernel
+from springline.codegen.kernel.runs import STATUS, Runs
+from springline.codegen.kernel.settings import LoopSettings
+from springline.codegen.kernel.spec import ONE_RUN, KernelSpec
+from springline.model.structure import Structure
+from springline.model.system import System
+from springline.runner.run.crew import Crew, results
+from springline.runner.sweep.work import perform
 
 LONG = LoopSettings(1_000_000_000, 1e-5)  # minutes
 

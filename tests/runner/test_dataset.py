@@ -23,19 +23,23 @@ import pytest
 from pyarrow import parquet
 from typer.testing import CliRunner
 
-from springline.codegen import atomic, lanes
-from springline.codegen.atomic import TEMPORARY
-from springline.codegen.kernel_source import runtime_sources
-from springline.runner import work
-from springline.runner.batch import open_pool, run_sweep, versions
+from springline.codegen.files import atomic
+from springline.codegen.files.atomic import TEMPORARY
+from springline.codegen.kernel import lanes
+from springline.codegen.kernel.source import runtime_sources
 from springline.runner.cli import app
-from springline.runner.commands.batch import batch, replay
-from springline.runner.dataset import Dataset, changes, place, read_dataset
-from springline.runner.errors import InputError
-from springline.runner.plan import Plan
-from springline.runner.replay import stored_plan
-from springline.runner.scenario import load_scenario
-from springline.runner.sweep import load_sweep
+from springline.runner.cli.commands.batch import batch, replay
+from springline.runner.files.errors import InputError
+from springline.runner.scenario.scenario import load_scenario
+from springline.runner.sweep import work
+from springline.runner.sweep.changes import changes
+from springline.runner.sweep.dataset import Dataset, read_dataset
+from springline.runner.sweep.places import place
+from springline.runner.sweep.plan import Plan
+from springline.runner.sweep.pool import open_pool
+from springline.runner.sweep.replay import stored_plan
+from springline.runner.sweep.running import run_sweep, versions
+from springline.runner.sweep.sweep import load_sweep
 
 SWEEP = """
 scenario = "paper/nominal"
@@ -224,7 +228,7 @@ def test_resume_refuses_another_sampler(
     write: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run(write(), tmp_path / "data")
-    monkeypatch.setattr("springline.runner.sampling.VERSION", 2)
+    monkeypatch.setattr("springline.runner.sweep.sampling.VERSION", 2)
     with pytest.raises(InputError, match="\n  sampler: 1 -> 2"):
         run(write(), tmp_path / "data", resume=True)
     with pytest.raises(InputError, match="drawn by another version of the sampler: expected 2, got 1"):
@@ -546,7 +550,7 @@ def test_an_unknown_kind_of_url_is_the_users_mistake(memory: str) -> None:
 def processes() -> ForkServerContext:
     """Processes that start with everything imported, so that a kill strikes work and not imports."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["springline.runner.commands.batch", "springline.runner.batch"])
+    context.set_forkserver_preload(["springline.runner.cli.commands.batch", "springline.runner.sweep.running"])
     return context
 
 
@@ -619,7 +623,7 @@ def test_a_full_disk_is_told_and_what_is_there_stays_sound(
     write: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With a disk that has room for three parts; the real thing is the next test."""
-    monkeypatch.setattr(import_module("springline.runner.batch"), "_PAUSE", 0.0)
+    monkeypatch.setattr(import_module("springline.runner.sweep.running"), "_PAUSE", 0.0)
     genuine, room = atomic._write_through, [3]
 
     def full(path: Path, data: bytes) -> None:
@@ -644,7 +648,7 @@ SMALL_DISK = """
 import subprocess, sys
 from typer.testing import CliRunner
 from springline.runner.cli import app
-from springline.runner.dataset import Folder
+from springline.runner.sweep.places import Folder
 sweep, disk = sys.argv[1:]
 def call(*more):
     done = CliRunner().invoke(app, ["batch", sweep, "-o", disk + "/data", "--no-plot", *more])

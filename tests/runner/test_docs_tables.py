@@ -9,7 +9,7 @@ import pytest
 from springline.model.parameters import Joint
 from springline.model.quantities import Quantity
 from springline.model.system import System
-from springline.runner.docs_tables import put, table, tables, written
+from springline.runner.report.docs_tables import put, table, tables, written
 
 ROOT = Path(__file__).parents[2]
 

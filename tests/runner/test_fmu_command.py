@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from springline.codegen import toolchain
+from springline.codegen.kernel import toolchain
 from springline.runner.cli import app
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fmu_coupling.py"

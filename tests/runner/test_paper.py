@@ -21,17 +21,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springline.codegen.manifest import FolderConflict
-from springline.runner import paper
-from springline.runner.errors import InputError
-from springline.runner.measured import Measured
-from springline.runner.paper import Reproduction, reproduce
-from springline.runner.paper_cases import CASES, GROUPS, JOINTS, MEASURES, cases
-from springline.runner.paper_figures import FIGURES, OPEN_FIGURES
-from springline.runner.paper_report import change, number, plain
-from springline.runner.paper_runs import E8_SHAKE, measure, reaching_law, theory_of, with_velocities
-from springline.runner.scenario import load_scenario, packaged_scenarios
-from springline.runner.simulate import simulate
+from springline.codegen.files.manifest import FolderConflict
+from springline.runner.files.errors import InputError
+from springline.runner.paper import reproduction
+from springline.runner.paper.cases import CASES, GROUPS, JOINTS, MEASURES, cases
+from springline.runner.paper.figures import FIGURES, OPEN_FIGURES
+from springline.runner.paper.measured import Measured
+from springline.runner.paper.report import change, number, plain
+from springline.runner.paper.reproduction import Reproduction, reproduce
+from springline.runner.paper.runs import E8_SHAKE, measure, reaching_law, theory_of, with_velocities
+from springline.runner.run.simulation import simulate
+from springline.runner.scenario.locate import packaged_scenarios
+from springline.runner.scenario.scenario import load_scenario
 
 
 def seen(**overrides: Any) -> Measured:
@@ -241,7 +242,9 @@ def drawn(done: Reproduction, monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are those of `done`, for tests of anything else: to draw them would take most of the time."""
     figures = done.folder / "figures"
     monkeypatch.setattr(
-        paper, "figure_files", lambda name, _: {file.name: file.read_bytes() for file in figures.glob(f"{name}.*")}
+        reproduction,
+        "figure_files",
+        lambda name, _: {file.name: file.read_bytes() for file in figures.glob(f"{name}.*")},
     )
 
 
@@ -317,7 +320,7 @@ def test_a_report_that_would_lose_something_is_kept(
     manifest = json.loads((tmp_path / "out/manifest.json").read_bytes())
     (tmp_path / "out/manifest.json").write_text(json.dumps(manifest | there))
     before = contents(tmp_path)
-    monkeypatch.setattr(paper, "study", computed)
+    monkeypatch.setattr(reproduction, "study", computed)
     with pytest.raises(FolderConflict, match=rf"{told}(.|\n)*--force"):
         reproduce(tmp_path / "out", [4])
     with pytest.raises(AssertionError, match="before anything"):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from springline.runner.plots import draw, envelope, figure_files, house_style, label, legend_above, panels, run_figures
-from springline.runner.scenario import Scenario, load_scenario
-from springline.runner.simulate import Result, simulate
+from springline.runner.report.style import draw, envelope, figure_files, house_style, label, legend_above, panels
+from springline.runner.run.figures import run_figures
+from springline.runner.run.simulation import Result, simulate
+from springline.runner.scenario.scenario import Scenario, load_scenario
 
 ALWAYS = {"tracking", "error", "force", "sliding", "springs"}
 

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from springline.runner.seal import Seal, content_hash
+from springline.runner.sweep.seal import Seal, content_hash
 
 SCHEMA = pa.schema([("run", pa.int64()), ("x", pa.float64()), ("on", pa.bool_()), ("law", pa.string())])
 TABLE = pa.table(

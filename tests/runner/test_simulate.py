@@ -1,19 +1,21 @@
 """A single run: what its columns mean, what its last words are, and what is refused before it starts."""
 
 import shutil
-import sys
 from collections import namedtuple
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from springline.codegen.kernel import METRICS, MOST_STEPS, LoopSettings, Runs
+from springline.codegen.kernel.runs import METRICS, Runs
+from springline.codegen.kernel.settings import MOST_STEPS, LoopSettings
 from springline.runner.cli import app
-from springline.runner.errors import InputError
-from springline.runner.scenario import load_scenario
-from springline.runner.simulate import metrics_schema, outcome, simulate
+from springline.runner.files.errors import InputError
+from springline.runner.run.columns import metrics_schema
+from springline.runner.run.simulation import outcome, simulate
+from springline.runner.scenario.scenario import load_scenario
 
 
 def springline(*arguments: str | Path) -> Result:
@@ -168,7 +170,7 @@ def test_numbers_too_large_to_run_with_are_refused_with_key_and_limit(
 def test_a_trajectory_beyond_the_memory_is_refused_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three times 20 numbers a row; the first row and the last come besides those that output_every asks for."""
     scenario = load_scenario("paper/nominal", {"simulation.duration": 0.1, "simulation.output_every": 3})
-    rows, module = 1000 // 3 + 2, sys.modules[simulate.__module__]
+    rows, module = 1000 // 3 + 2, import_module("springline.runner.run.limits")
     monkeypatch.setattr(module, "memory", lambda: 3 * 8 * 20 * rows)
     assert len(simulate(scenario).trajectory) == rows
     monkeypatch.setattr(module, "memory", lambda: 3 * 8 * 20 * rows - 1)

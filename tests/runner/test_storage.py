@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springline.codegen.atomic import write_file
-from springline.runner import storage
-from springline.runner.simulate import field
-from springline.runner.storage import read_table, table_files, units, write_folder
+from springline.codegen.files.atomic import write_file
+from springline.runner.files import storage
+from springline.runner.files.storage import read_table, table_files, units, write_folder
+from springline.runner.run.columns import field
 
 SCHEMA = pa.schema([field("t", "s"), field("force", "N m"), field("status", "", pa.string())])
 TABLE = pa.table(

@@ -10,12 +10,22 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyder, polyval
 
-from springline.codegen import kernel
-from springline.runner.errors import InputError
-from springline.runner.tables import ENDS, HALF_TURN, UNITS, Column, Ends, Table, kernel_tables, read_table, spline
+from springline.codegen.program import tables
+from springline.runner.files.errors import InputError
+from springline.runner.scenario.splines import (
+    ENDS,
+    HALF_TURN,
+    UNITS,
+    Column,
+    Ends,
+    Spline,
+    kernel_tables,
+    read_table,
+    spline,
+)
 
 DATA = Path(__file__).parent.parent / "data"
-Knots = Table | kernel.Table
+Knots = Spline | tables.SignalTable
 
 
 def evaluate(table: Knots, t: np.ndarray, derivative: int = 0) -> np.ndarray:
@@ -36,7 +46,7 @@ def at_knots(table: Knots, derivative: int) -> tuple[np.ndarray, np.ndarray]:
 
 def read(
     text: str, ends: Ends = "error", columns: tuple[str, ...] = ("a",), *, unit: str = "", seconds: float = 1.0
-) -> tuple[Table, list[str]]:
+) -> tuple[Spline, list[str]]:
     """A table from CSV text, with its notes; the columns in SI units or in a unit of an angle."""
     factor, half_turn = UNITS["rad"].get(unit, 1.0), HALF_TURN.get(unit, math.inf)
     channels = [Column(name, f"reference.columns.{name}", factor, half_turn) for name in columns]
@@ -44,7 +54,7 @@ def read(
     return read_table(text.encode(), "x.csv", time, channels, ends, where="s.toml", key="reference.path")
 
 
-def csv(text: str, ends: Ends = "error", columns: tuple[str, ...] = ("a",)) -> Table:
+def csv(text: str, ends: Ends = "error", columns: tuple[str, ...] = ("a",)) -> Spline:
     """A table in SI units from CSV text of which there is nothing to note."""
     table, notes = read(text, ends, columns)
     assert notes == []
@@ -80,7 +90,7 @@ def test_value_rate_and_acceleration_are_continuous(ends: Ends) -> None:
 # Outside the samples
 
 
-def own_accelerations(table: Table) -> np.ndarray:
+def own_accelerations(table: Spline) -> np.ndarray:
     """The largest acceleration of each channel between the samples: it is linear from knot to knot."""
     c2, c3 = table.coefficients[..., 2], table.coefficients[..., 3]
     return np.maximum(np.abs(2 * c2).max(axis=0), np.abs(2 * c2 + 6 * c3 * table.dt).max(axis=0))

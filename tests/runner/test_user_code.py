@@ -12,22 +12,22 @@ import pytest
 from pyarrow import parquet
 from typer.testing import CliRunner
 
-from springline.codegen import toolchain
-from springline.runner.batch import batch
+from springline.codegen.kernel import toolchain
 from springline.runner.cli import app
-from springline.runner.errors import InputError
-from springline.runner.plan import Plan
-from springline.runner.scenario import load_scenario
-from springline.runner.simulate import simulate
-from springline.runner.sweep import load_sweep
-from springline.runner.user_code import without_code
-from springline.runner.work import parcel
+from springline.runner.files.errors import InputError
+from springline.runner.run.simulation import simulate
+from springline.runner.scenario.scenario import load_scenario
+from springline.runner.scenario.user_code import without_code
+from springline.runner.sweep.arrays import batch
+from springline.runner.sweep.plan import Plan
+from springline.runner.sweep.sweep import load_sweep
+from springline.runner.sweep.work import parcel
 
 LAW = """
 import casadi as ca
 from helper import smooth
 from springline.model.parameters import POSITIVE, Parameter
-from springline.model.sliding import Law
+from springline.model.control.sliding import Law
 
 class Smooth(Law):
     parameters = (Parameter("gain", "1/s", 30.0, "slope", POSITIVE),)
@@ -38,7 +38,7 @@ class Smooth(Law):
 HELPER = "import casadi as ca\n\ndef smooth(s):\n    return s / ca.sqrt(1 + s**2)\n"
 ARM = """
 import casadi as ca
-from springline.model.mechanism import Mechanism
+from springline.model.mechanisms.mechanism import Mechanism
 from springline.model.parameters import Joint, Parameter
 
 class Boom(Mechanism):
@@ -64,7 +64,7 @@ class Boom(Mechanism):
         return sum(m * ca.dot(gravity, r) for m, r in self.places(q, p))
 """
 CONTROLLER = """
-from springline.model.controller import Control, Controller
+from springline.model.control.controller import Control, Controller
 from springline.model.parameters import Parameter
 
 class Servo(Controller):
@@ -335,8 +335,8 @@ def test_a_law_that_varies_is_found_again(folder: Path) -> None:
 
 
 HEAD = (
-    "import casadi as ca\nfrom springline.model.sliding import Law\nfrom springline.model.controller import Control, "
-    "Controller\nfrom springline.model.mechanism import Mechanism\nfrom springline.model.parameters import Joint, "
+    "import casadi as ca\nfrom springline.model.control.sliding import Law\nfrom springline.model.control.controller import Control, "
+    "Controller\nfrom springline.model.mechanisms.mechanism import Mechanism\nfrom springline.model.parameters import Joint, "
     "Parameter\n"
 )
 OF_ARM = (
@@ -443,7 +443,7 @@ def test_a_fault_of_our_own_is_none_of_the_user_s(folder: Path, monkeypatch: pyt
     def broken(*_: object) -> None:
         raise KeyError("of ours")
 
-    monkeypatch.setattr("springline.codegen.lanes.emit", broken)
+    monkeypatch.setattr("springline.codegen.kernel.lanes.emit", broken)
     (folder / "law.py").write_text(LAW + "# as no other test has it\n")
     with pytest.raises(KeyError, match="of ours"):
         load_scenario(folder / "law.toml")
@@ -458,7 +458,7 @@ def test_workers_need_no_file(folder: Path, dataset: Path) -> None:
     for file in ("law.py", "helper.py", "law.toml"):
         (folder / file).unlink()
     program = (
-        "import pickle, sys; from springline.runner.work import perform_parcel\n"
+        "import pickle, sys; from springline.runner.sweep.work import perform_parcel\n"
         "outcome = perform_parcel(*pickle.load(open(sys.argv[1], 'rb')))\n"
         "sys.stdout.buffer.write(outcome.runs.metrics.tobytes())\n"
         "assert not any('springline_user' in name for name in sys.modules)\n"

@@ -1,0 +1,5 @@
+"""Exports: a system with its numbers bound; every target is a folder here."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

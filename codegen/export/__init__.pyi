@@ -1,0 +1,11 @@
+from .bound import Export as Export
+from .bound import PERIOD as PERIOD
+from .bound import Port as Port
+from .bound import bind as bind
+from .bound import comment as comment
+from .bound import operations as operations
+from .bound import port_entries as port_entries
+from .bound import provenance as provenance
+from .names import check_files as check_files
+from .scalar import Body as Body
+from .scalar import ScalarPrinter as ScalarPrinter

@@ -1,0 +1,2 @@
+from .archive import fmu as fmu
+from .settings import Settings as Settings

@@ -1,0 +1,289 @@
+"""An export's functions as plain scalar C, double or float, printed from the value graph of the frozen Functions.
+
+What CasADi's C computes, to the last bit (in double): equal values are computed once, what depends on parameters only
+is computed when they are set, sin and cos of one angle become one call. The statements stay in the order of the frozen
+lists, which keeps few values alive at a time: on a small processor that is what counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, cast
+
+import casadi as ca
+
+from springline.codegen.export.bound import Export, port_entries
+from springline.codegen.program import MASKS, POWERS, Binding, Real, ValueGraph, literal, print_operation
+from springline.model.control import LARGEST_EXPONENT, TINY
+
+# Guards among the model's constants that a float cannot hold, and what does their duty there: 1e-24**(-4/3), the
+# steepest power on the control's way, and exp(85) times a gain of 20 are still finite.
+_SINGLE = {TINY: 1e-24, LARGEST_EXPONENT: 85.0}
+
+
+class _SinglePrecision:
+    """A Function whose own constants are such that floats can hold them; parameters are left alone."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self._function = function
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._function, name)
+
+    def instruction_constant(self, k: int) -> float:
+        """The constant of instruction k."""
+        value = float(self._function.instruction_constant(k))
+        return _SINGLE.get(value, value)
+
+
+class _Values(ValueGraph):
+    """Value graph of an export: references, measurements, base motion and commands come from outside."""
+
+    def __init__(self, export: Export) -> None:
+        super().__init__()
+        self._single = export.real == "float"
+        self.tunable = tuple(slot.key for slot in export.tunable_slots)
+        column = {slot: k for k, slot in enumerate(export.tunable)}
+        self._known = {
+            "p": [
+                self.leaf("p", column[i], Binding.RUN, varies=True) if i in column else self.constant(value)
+                for i, value in enumerate(export.values)
+            ],
+        }
+        if not export.tables:
+            self._known["d"] = [self.constant(0.0)] * export.system.d.numel()
+
+    def apply(self, function: ca.Function, **given: list[int]) -> list[int]:
+        """Add a Function; the nodes of all its outputs' entries. Inputs not given are leaves of their own names."""
+        names = [function.name_in(i) for i in range(function.n_in())]
+        known = self._known | given
+        inputs = [
+            known[name] if name in known else [self.leaf(name, k, Binding.STATE) for k in range(function.numel_in(i))]
+            for i, name in enumerate(names)
+        ]
+        printed = cast(ca.Function, _SinglePrecision(function)) if self._single else function
+        return [i for output in self.add(function.name(), printed, inputs) for i in output]
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Statements of a function and what they cost.
+
+    values      C of the outputs' entries, where `lines` have run
+    operations  arithmetic operations and calls of elementary functions
+    live        most values that are alive at once
+    """
+
+    lines: tuple[str, ...]
+    values: tuple[str, ...]
+    operations: int
+    live: int
+
+
+class ScalarPrinter:
+    """Prints Functions of an export as C statements; they share one value graph.
+
+    functions  Functions of the System, each input named for what it is ("x", "q1d", …); p and d are the System's
+    hoist      values that depend on parameters only are not computed by the functions but by `derive`
+    """
+
+    def __init__(self, export: Export, functions: Sequence[ca.Function], *, hoist: bool) -> None:
+        self._export = export
+        self._real: Real = export.real
+        self._math = "slf" if export.real == "float" else "sl"
+        self._hoist = hoist
+        self._graph = _Values(export)
+        beginning = {"t": [self._graph.constant(0.0)]}
+        self._wanted = {
+            function.name(): self._graph.apply(function, **(beginning if function.name() == "start" else {}))
+            for function in functions
+        }
+        self._labels = {
+            function.name(): [label for port in export.outputs(function) for label in port.labels]
+            for function in functions
+        }
+        self._name_inputs()
+
+    def _name_inputs(self) -> None:
+        entries = port_entries(self._export.system)
+        self._names = {}
+        for i, node in enumerate(self._graph.nodes):
+            source, k = node.source
+            if node.op is None and node.binding is not Binding.CONSTANT:
+                is_p = source == "p"
+                self._names[i] = self._export.tunable_slots[k].symbol if is_p else entries[source][k][0]
+
+    def join(self, name: str, function: ca.Function, **constants: float) -> None:
+        """Let Function `name` also compute the outputs of `function`, after its own; `constants` are inputs of it."""
+        given = {port: [self._graph.constant(value)] for port, value in constants.items()}
+        self._wanted[name] += self._graph.apply(function, **given)
+        self._labels[name] += [label for port in self._export.outputs(function) for label in port.labels]
+        self._name_inputs()
+
+    def compose(self, name: str, port: str, function: ca.Function, quantity: str) -> None:
+        """Let Function `name` also compute the scalar `function` of every entry of its output `port`.
+
+        The results come after its own outputs, under the names that `quantity` has; what both compute is computed once.
+        """
+        labels = [label for label, _ in port_entries(self._export.system)[port]]
+        places = [self._labels[name].index(label) for label in labels]
+        [argument] = (function.name_in(i) for i in range(function.n_in()) if function.name_in(i) != "p")
+        for place in places:
+            self._wanted[name] += self._graph.apply(function, **{argument: [self._wanted[name][place]]})
+        self._labels[name] += [label for label, _ in port_entries(self._export.system)[quantity]]
+
+    @cached_property
+    def _derived(self) -> dict[int, int]:
+        """Place among the derived values of each node that depends on parameters only and is needed by a function."""
+        places: dict[int, int] = {}
+        if self._hoist:
+            for wanted in self._wanted.values():
+                for i in self._given(wanted):
+                    if self._graph.nodes[i].op is not None:
+                        places.setdefault(i, len(places))
+        return places
+
+    @property
+    def derived(self) -> int:
+        """How many values depend on parameters only, are no constants, and are needed by a function."""
+        return len(self._derived)
+
+    def reads(self, name: str) -> frozenset[tuple[str, int]]:
+        """The inputs (name, entry) that Function `name` reads."""
+        sources = (self._graph.nodes[i].source for i in self._given(self._wanted[name]))
+        return frozenset(source for source in sources if source[0])
+
+    def body(self, name: str, load: Callable[[str, int], str], targets: Sequence[str]) -> Body:
+        """Function `name`; load(input, entry) is the C of an input ("derived" is one).
+
+        targets  take its outputs, the first of them where there are more outputs than targets; "" takes none
+        """
+        wanted, labels = self._wanted[name], self._labels[name]
+        if "" in targets:
+            taken = [k for k, target in enumerate(targets) if target]
+            wanted, labels = [wanted[k] for k in taken], [labels[k] for k in taken]
+            targets = [targets[k] for k in taken]
+        return self._body(wanted, self._needed(wanted), load, targets, labels)
+
+    def derive(self, load: Callable[[str, int], str], target: str) -> Body:
+        """What `functions` expect under target[0], target[1], …"""
+        wanted = list(self._derived)
+        needed = self._graph.needed(wanted, Binding.RUN)
+        targets = [f"{target}[{k}]" for k in range(len(wanted))]
+        return self._body(wanted, needed, load, targets, [f"r{k}" for k in range(len(wanted))], deriving=True)
+
+    def _is_input(self, i: int) -> bool:
+        node = self._graph.nodes[i]
+        return node.op is None and node.binding is not Binding.CONSTANT
+
+    def _needed(self, wanted: Sequence[int]) -> list[int]:
+        found = self._graph.needed(wanted, Binding.STATE)
+        if self._hoist:
+            return found
+        arguments = [a for i in found for a in self._graph.nodes[i].arguments]
+        return sorted({*found, *self._graph.needed([*wanted, *arguments], Binding.RUN)})
+
+    def _given(self, wanted: Sequence[int]) -> list[int]:
+        """Values that come from outside when `wanted` is computed."""
+        needed = self._needed(wanted)
+        used = {*wanted, *(a for i in needed for a in self._graph.nodes[i].arguments)} - set(needed)
+        return sorted(i for i in used if self._graph.nodes[i].binding is not Binding.CONSTANT)
+
+    def _body(
+        self,
+        wanted: Sequence[int],
+        needed: Sequence[int],
+        load: Callable[[str, int], str],
+        targets: Sequence[str],
+        labels: Sequence[str],
+        *,
+        deriving: bool = False,
+    ) -> Body:
+        nodes = self._graph.nodes
+        lines: list[str] = []
+        ready: set[int] = set()
+        names = self._named(wanted, needed, labels)
+        pairs = {(nodes[i].op, nodes[i].arguments[0]): i for i in needed if nodes[i].op in (ca.OP_SIN, ca.OP_COS)}
+
+        def given(i: int) -> str:
+            derived = not deriving and i in self._derived
+            return load("derived", self._derived[i]) if derived else load(*nodes[i].source)
+
+        def value(i: int) -> str:
+            node = nodes[i]
+            if node.binding is Binding.CONSTANT:
+                return literal(node.value, self._real)
+            if i not in ready:
+                ready.add(i)
+                if given(i) != names[i]:
+                    lines.append(f"const {self._real} {names[i]} = {given(i)};")
+            return f"{self._math}_true({names[i]})" if node.op in MASKS else names[i]
+
+        def truth(i: int) -> str:
+            text = value(i)
+            return names[i] if nodes[i].op in MASKS else f"({text} != {literal(0.0, self._real)})"
+
+        for i in needed:
+            node = nodes[i]
+            if i in ready:
+                continue
+            if node.op in (ca.OP_SIN, ca.OP_COS) and len({(op, a) for op, a in pairs if a == node.arguments[0]}) == 2:
+                sine, cosine = pairs[ca.OP_SIN, node.arguments[0]], pairs[ca.OP_COS, node.arguments[0]]
+                argument = value(node.arguments[0])
+                lines.append(f"{self._real} {names[sine]}, {names[cosine]};")
+                lines.append(f"{self._math}_sincos({argument}, &{names[sine]}, &{names[cosine]});")
+                ready |= {sine, cosine}
+                continue
+            text = self._expression(i, value, truth)
+            kind = "int" if node.op in MASKS else self._real
+            lines.append(f"const {kind} {names[i]} = {text};")
+            ready.add(i)
+        # What is only handed on needs no name.
+        values = [given(i) if self._is_input(i) and i not in ready else value(i) for i in wanted]
+        lines += [f"{target} = {text};" for target, text in zip(targets, values[: len(targets)], strict=True)]
+        return Body(tuple(lines), tuple(values), len(needed), self._live(wanted, needed))
+
+    def _named(self, wanted: Sequence[int], needed: Sequence[int], labels: Sequence[str]) -> dict[int, str]:
+        """What each value is called: by the model where it has a word for it, else a0, a1, … in order."""
+        nodes = self._graph.nodes
+        names = dict(self._names) | {i: f"r{k}" for i, k in self._derived.items()}
+        for i, label in zip(wanted, labels, strict=True):
+            names.setdefault(i, label)
+        for position, i in enumerate(needed):
+            if nodes[i].op in (ca.OP_SIN, ca.OP_COS) and nodes[i].arguments[0] in self._names:
+                function = "sin" if nodes[i].op == ca.OP_SIN else "cos"
+                names.setdefault(i, f"{function}_{names[nodes[i].arguments[0]]}")
+            names.setdefault(i, f"a{position}")
+        return names
+
+    def _live(self, wanted: Sequence[int], needed: Sequence[int]) -> int:
+        """Most values alive at once when each is computed in order and outputs are kept to the end."""
+        last = {a: position for position, i in enumerate(needed) for a in self._graph.nodes[i].arguments}
+        last |= dict.fromkeys(wanted, len(needed))
+        alive: set[int] = set()
+        most = 0
+        for position, i in enumerate(needed):
+            alive |= {i, *(a for a in self._graph.nodes[i].arguments if self._graph.nodes[a].op is not None)}
+            most = max(most, len(alive))
+            alive = {k for k in alive if last.get(k, -1) > position}
+        return most
+
+    def _expression(self, i: int, value: Callable[[int], str], truth: Callable[[int], str]) -> str:
+        node = self._graph.nodes[i]
+        assert node.op is not None
+        exponent: float | None = None
+        if node.op in POWERS and self._graph.nodes[node.arguments[1]].binding is Binding.CONSTANT:
+            exponent = self._graph.nodes[node.arguments[1]].value
+        return print_operation(
+            node.op,
+            node.arguments,
+            library=self._math,
+            value=value,
+            truth=truth,
+            constant=lambda number: literal(number, self._real),
+            exponent=exponent,
+            call=lambda name, operands: f"{self._math}_{name}({', '.join(operands)})",
+            origin=node.origin,
+        )

@@ -1,0 +1,12 @@
+from .atomic import TEMPORARY as TEMPORARY
+from .atomic import change_folder as change_folder
+from .atomic import write_file as write_file
+from .canonical import canonical_json as canonical_json
+from .manifest import Changes as Changes
+from .manifest import FolderConflict as FolderConflict
+from .manifest import MANIFEST as MANIFEST
+from .manifest import Stale as Stale
+from .manifest import check_tree as check_tree
+from .manifest import read_manifest as read_manifest
+from .manifest import summary as summary
+from .manifest import write_tree as write_tree

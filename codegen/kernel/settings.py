@@ -1,0 +1,53 @@
+"""What the loop is told of a simulation: steps, time, bound, and what its runs are judged by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from springline.codegen.numbers import real, whole
+
+MOST_STEPS = 2**53
+"""Steps are counted in doubles too, and these hold no more whole numbers without a gap."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoopSettings:
+    """What the loop is told about every run of a batch: steps of h s, bound on |x_i|, sampling, output, thresholds.
+
+    Raises ValueError, with the name and what was expected, for numbers that the loop cannot count or step with.
+    """
+
+    steps: int
+    step: float
+    bound: float = 1e6
+    hold: int = 1
+    output_every: int = 0
+    response_band: float = 0.10
+    settling_band: float = 0.05
+    response_error: float = 0.0
+    settling_error: float = 0.0
+    start_time: float = 0.0
+
+    def __post_init__(self) -> None:
+        checked = {
+            "steps": whole("steps", self.steps, 0, MOST_STEPS),
+            "step": real("step", self.step, positive=True),
+            "bound": real("bound", self.bound, positive=True, infinite=True),
+            "hold": whole("hold", self.hold, 1, MOST_STEPS),
+            "output_every": whole("output_every", self.output_every, 0, MOST_STEPS),
+            "response_band": real("response_band", self.response_band),
+            "settling_band": real("settling_band", self.settling_band),
+            "response_error": real("response_error", self.response_error),
+            "settling_error": real("settling_error", self.settling_error),
+            "start_time": real("start_time", self.start_time),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)  # the numbers that were checked, whatever type they came in
+        real("end, start_time + steps * step,", self.start_time + self.steps * self.step)
+
+    @property
+    def rows(self) -> int:
+        """Trajectory rows of a complete run: k = 0, output_every, ..., and N."""
+        if self.output_every == 0:
+            return 0
+        return self.steps // self.output_every + 1 + (self.steps % self.output_every != 0)

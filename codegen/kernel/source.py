@@ -1,0 +1,134 @@
+"""The C of a kernel: the loop's fixed sources and the printed kernel.h, with the flags that compile them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+
+from springline.codegen.kernel import lanes, toolchain
+from springline.codegen.kernel.job import job_header
+from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.codegen.program import Program, casadi_c, kernel_update
+from springline.model.base import COORDINATES
+from springline.model.quantities import METRICS
+
+_RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
+
+
+@dataclass(frozen=True, slots=True)
+class KernelSource:
+    """All that a compiler has to be given: it may travel to another machine.
+
+    files       (name, text), loop.c is the one to compile
+    flags       compiler flags
+    parameters  slot keys in the order of the parameter columns
+    """
+
+    files: tuple[tuple[str, str], ...]
+    flags: tuple[str, ...]
+    parameters: tuple[str, ...]
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of files and parameters: equal hashes compute equal results."""
+        return hashlib.sha256(json.dumps([self.files, self.parameters]).encode()).hexdigest()
+
+
+def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: bool, sizes: Mapping[str, int]) -> str:
+    """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
+    memory, sliding = program.size("z"), len(program.system.sliding)
+    channels = sum(len(table.channels) for table in program.system.tables)
+    numbers = {
+        "SL_NJ": program.system.n,
+        "SL_NX": program.size("x") + memory,
+        "SL_NB": len(COORDINATES),
+        "SL_NP": sizes["p"],
+        "SL_NR": sizes["r"],
+        "SL_NU": sizes["uniform"],
+        "SL_NV": sizes["varying"],
+        "SL_ND": program.size("d"),
+        "SL_NTABLES": len(program.system.tables),
+    }
+    assert program.size("d") == len(program.system.tables) + 4 * channels
+    enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
+    metrics = "".join(f"  SL_{metric.name.upper()},\n" for metric in METRICS)
+    return f"""#define SL_W {width}
+#define SL_G {groups}
+#define SL_PACKS {packs}
+#define SL_SAMPLED {int(sampled)}
+#define SL_NZ {memory}
+#define SL_SLIDING {sliding}
+#include "sl_lanes.h"
+
+typedef sl_v sl_group[SL_G]; /* one quantity of a pack of runs */
+
+/* Signals at one time: those that all runs share (SL_W doubles apart) and those of each run. */
+typedef struct {{
+  const double *uniform;
+  const sl_group *varying;
+}} sl_time;
+
+enum {{ {enum} }};
+
+enum {{
+{metrics}  SL_METRICS_PER_JOINT
+}};
+
+/* On vectors an evaluation stands by itself: inlined into the loop it would share its registers, and spill them. */
+#if SL_W > 1
+#define SL_EVALUATION static __attribute__((noinline, unused))
+#else
+#define SL_EVALUATION static inline
+#endif
+
+{kernel_update(program.system.tableau, "SL_NX - SL_NZ" if sampled and memory else "SL_NX")}"""
+
+
+def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
+    """Print the kernel of a Program, which is that of the spec's structure.
+
+    Raises ValueError for a Program of another structure, UnprintableOperation, ToolchainError when there is no compiler
+    to ask how wide its vectors are.
+    """
+    if program.system.structure != spec.structure:
+        raise ValueError(f"the program is of {program.system.structure}, expected {spec.structure}")
+    slots, size, sampled, options = program.system.slots, program.size, spec.sampled, spec.options
+    if options.engine == "casadi":
+        sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
+        start = preamble(program, width=1, groups=1, packs=1, sampled=sampled, sizes=sizes)
+        parameters = tuple(slot.key for slot in slots)
+        files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}
+    else:
+        width = options.width or toolchain.native_vector_width(options.compiler)
+        groups = options.groups or (2 if width > 1 else 1)
+        # The plant alone is a short evaluation and a long chain: others have to fill its gaps.
+        packs = options.packs or (2 if sampled and width > 1 else 1)
+        emission = lanes.emit(program, spec.constants, groups)
+        start = preamble(program, width=width, groups=groups, packs=packs, sampled=sampled, sizes=emission.sizes)
+        parameters = emission.tunable
+        files = {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}"}
+    return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)
+
+
+def best_flags(compiler: toolchain.Compiler) -> tuple[str, ...]:
+    """Optimisation flags that make the fastest kernel with this compiler on this machine."""
+    flags = ("-O3", *toolchain.native_flags(compiler))
+    if compiler.family == "gcc":  # its scheduler before register allocation hides the latencies
+        flags += ("-fschedule-insns", "-fsched-pressure", "-mtune=generic")
+    return flags
+
+
+def _flags(options: KernelOptions) -> tuple[str, ...]:
+    wanted = best_flags(options.compiler or toolchain.find_compiler()) if options.flags is None else options.flags
+    return (*wanted, "-std=gnu99", "-fvisibility=hidden", "-Wno-unused-parameter", "-Wno-psabi", "-lm")
+
+
+@lru_cache(maxsize=1)
+def runtime_sources() -> dict[str, str]:
+    """The C that all kernels share, by file name."""
+    folder = resources.files("springline.codegen") / "runtime"
+    return {"simulate.h": job_header(), **{name: (folder / name).read_text() for name in _RUNTIME}}

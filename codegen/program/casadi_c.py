@@ -1,0 +1,123 @@
+"""C by CasADi's own code generator, on springline's elementary functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+
+from springline.codegen.program.frozen import Program
+from springline.codegen.program.literals import literal
+
+
+def print_functions(
+    functions: Sequence[ca.Function],
+    stem: str,
+    *,
+    includes: Sequence[str] = ("sl_casadi.h",),
+    integer: str = "int",
+) -> str:
+    """CasADi's C source of SX Functions, for a file named stem.c.
+
+    includes  the last has to be "sl_casadi.h": the mathematics come from there, nothing from the host's <math.h>
+    integer   C type of sizes and sparsity patterns; casadi.external expects "long long int"
+    """
+    generator = ca.CodeGenerator(
+        f"{stem}.c", {"with_header": False, "include_math": False, "casadi_int": integer, "static_aux": True}
+    )
+    for include in includes:
+        generator.add_include(include, True)
+    for function in functions:
+        generator.add(function)
+    text: str = generator.dump()
+    return text
+
+
+def kernel_header(program: Program, preamble: str) -> dict[str, str]:
+    """Sources "kernel.h" and "functions.c" of the loop's kernel: one run at a time, every parameter tunable.
+
+    preamble  the macros and types that every engine's kernel starts with
+    """
+    functions = program.functions
+
+    def call(name: str, *arguments: str, results: Sequence[str]) -> str:
+        function = functions[name]
+        lines = [
+            "  {",
+            f"  const double *arg[{max(function.sz_arg(), 1)}] = {{{', '.join(arguments)}}};",
+            f"  double *res[{max(function.sz_res(), 1)}] = {{{', '.join(results)}}};",
+            f"  double work[{max(function.sz_w(), 1)}];",
+            f"  int integers[{max(function.sz_iw(), 1)}];",
+            f"  (void){function.name()}(arg, res, integers, work, 0);",
+            "  }",
+        ]
+        return "\n".join(lines)
+
+    flat = "(const double *)"
+    w, s = f"{flat}now.varying", f"{flat}now.varying + SL_NUMBER_W"
+    x, p, r = f"{flat}x", f"{flat}p", f"{flat}r"
+    states, memory = program.size("x"), program.size("z")
+    at = (x, f"{flat}(x + {states})") if memory else (x,)  # z stands behind the plant's state
+    state = "sl_time now, const sl_group *x, const sl_group *p, const sl_group *r"
+    computed = "sl_group *u, sl_group *e, sl_group *sigma, sl_group *wished, sl_group *a_law"
+    results = [f"(double *){name}" for name in ("u", "e", "sigma", "wished", "a_law")]
+    begin = "".join(
+        f"\n  x[{states + k}][0] = slv_set({literal(value)});" for k, value in enumerate(program.system.z_start)
+    )
+    control = call("control", w, s, *at, p, r, results=results)
+    sampling, sampled, sample = state, computed, control
+    closed = "  kernel_control(now, x, p, r, u, e, sigma, wished, a_law);"
+    if memory:
+        sampling, sampled = state.replace("*x,", "*x, double period,"), f"{computed}, sl_group *ahead"
+        update = call("update", w, s, *at, "&period", p, r, results=["(double *)ahead"])
+        rates = call("rates", w, s, *at, p, r, results=[f"(double *)(dx + {states})"])
+        sample, closed = f"{control}\n{update}", f"{control}\n{rates}"
+    text = f"""{preamble}
+enum {{ SL_NUMBER_W = {program.size("w")} }};
+
+#define CASADI_SYMBOL_EXPORT __attribute__((visibility("hidden")))
+#include "functions.c"
+
+static inline void kernel_run(const sl_group *p, sl_group *r) {{
+{call("run", p, results=["(double *)r"])}
+}}
+
+static inline void kernel_start(double t, const double *d, const sl_group *p, const sl_group *r, sl_group *x) {{
+{call("start", "&t", "d", p, r, results=["(double *)x"])}{begin}
+}}
+
+static inline void kernel_uniform(const double *t, const double *d, sl_v *uniform) {{}}
+
+/* w and s behind each other: this engine binds every signal per run. */
+static inline void kernel_varying(double t, const double *d, const double *uniform, const sl_group *p,
+                                  const sl_group *r, sl_group *varying) {{
+{call("signals", "&t", "d", p, r, results=["(double *)varying"])}
+{call("time", flat + "varying", p, r, results=["(double *)(varying + SL_NUMBER_W)"])}
+}}
+
+static inline void kernel_signals(sl_time now, const sl_group *p, const sl_group *r, sl_group *q1d,
+                                  sl_group *b) {{
+  int i;
+  for (i = 0; i < SL_NJ; i++) q1d[i][0] = now.varying[i][0];
+  for (i = 0; i < SL_NB; i++) b[i][0] = now.varying[3 * SL_NJ + i][0];
+}}
+
+static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
+{call("error", w, s, *at, p, r, results=["(double *)e", "(double *)sigma"])}
+}}
+
+static inline void kernel_control({sampling}, {sampled}) {{
+{sample}
+}}
+
+static inline void kernel_plant(sl_time now, const sl_group *x, const sl_group *u, const sl_group *p, const sl_group *r,
+                                sl_group *dx) {{
+{call("plant", w, s, x, flat + "u", p, r, results=["(double *)dx"])}
+}}
+
+static inline void kernel_closed({state}, sl_group *dx, {computed}) {{
+{closed}
+  kernel_plant(now, x, (const sl_group *)u, p, r, dx);
+}}
+"""
+    return {"kernel.h": text, "functions.c": print_functions(list(functions.values()), "functions")}

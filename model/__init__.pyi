@@ -1,0 +1,14 @@
+from . import quantities as quantities
+from . import theory as theory
+from .base import BaseMotion as BaseMotion
+from .control import Control as Control
+from .control import Controller as Controller
+from .control import Law as Law
+from .mechanisms import Mechanism as Mechanism
+from .parameters import Bounds as Bounds
+from .parameters import Joint as Joint
+from .parameters import Parameter as Parameter
+from .quantities import Quantity as Quantity
+from .signals import SineTerm as SineTerm
+from .structure import Structure as Structure
+from .system import System as System

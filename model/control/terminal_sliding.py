@@ -1,0 +1,57 @@
+"""The paper's controller: computed torque on a terminal sliding surface, and fast control (docs/paper.md 4 and 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import casadi as ca
+
+from springline.model.control.common import fast_control
+from springline.model.control.controller import ArmModel, ArmTerms, Control, Controller
+from springline.model.control.reaching import LAWS, Law, reaching_rate
+from springline.model.control.sliding import SurfaceExponents, surface
+from springline.model.parameters import Values
+from springline.model.quantities import SIGMA, U_F, U_S
+
+
+def slow_control(ddq_d: ca.SX, u_e: ca.SX, arm: ArmTerms) -> ca.SX:
+    """U_s = H (ddq1d - u_e) + C dq1 + G, n x 1, with nominal parameters                                   (14)."""
+    return arm.H @ (ddq_d - u_e) + arm.c + arm.G
+
+
+@dataclass(frozen=True)
+class TerminalSliding(Controller):
+    """The composite law U = U_s + U_f                                                             (13), (25), E4.
+
+    reaching   how the sliding variable shall go to zero
+    exponents  of the surface
+    Its parameters are those of the [control] table; the rigid drive has no fast part.
+    """
+
+    name = "terminal_sliding"
+    title = "computed torque on a terminal sliding surface"
+    diagnostics = (SIGMA, U_S, U_F)
+
+    reaching: Law = LAWS["variable_power_log"]
+    exponents: SurfaceExponents = field(default_factory=SurfaceExponents)
+
+    @property
+    def law(self) -> Law:
+        """The reaching law."""
+        return self.reaching
+
+    def with_law(self, law: Law, exponents: SurfaceExponents) -> TerminalSliding:
+        """The controller with another law and surface."""
+        return TerminalSliding(law, exponents)
+
+    def control(self, r: Values, y: Values, z: Values, model: ArmModel, p: Values) -> Control:
+        """Command, error, sliding variable and the two parts of the command."""
+        error = r.q - y.q1
+        sigma, surface_rate = surface(error, r.dq - y.dq1, p, self.exponents)
+        rate, a_law = reaching_rate(self.reaching, sigma, p)
+        wished = slow = slow_control(r.ddq, rate - surface_rate, model(y.q1, y.dq1))
+        diagnostics = {SIGMA.name: sigma, U_S.name: slow}
+        if "dq2" in y:
+            fast = fast_control(y.dq1, y.dq2, p.K_f)
+            wished, diagnostics[U_F.name] = slow + fast, fast
+        return Control(wished, error, diagnostics=diagnostics, a_law=a_law)

@@ -1,0 +1,2 @@
+from .mechanism import Mechanism as Mechanism
+from .registry import MECHANISMS as MECHANISMS

@@ -1,0 +1,104 @@
+"""Symbols of reference and base motion: parameters where they are formulas, data where they are tables."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import casadi as ca
+
+from springline.model import signals as formulas
+from springline.model.parameters import ParameterVector
+from springline.model.signals import CONSTANT_ZERO, Signal
+from springline.model.structure import SignalShape, TableLayout
+
+SignalTableName = Literal["reference", "base_motion"]
+
+
+class SignalSymbols:
+    """Makes the symbols of one signal after the other.
+
+    t       time, s
+    tables  layout of d, the data of those that come from tables
+    """
+
+    def __init__(self, t: ca.SX, vector: ParameterVector) -> None:
+        """`vector` gets the parameters."""
+        self.t = t
+        self.tables: tuple[TableLayout, ...] = ()
+        self._vector = vector
+        self._data: list[ca.SX] = []
+
+    @property
+    def d(self) -> ca.SX:
+        """The data of all tables, one column."""
+        return ca.vertcat(*self._data)
+
+    def signal(
+        self,
+        table: SignalTableName,
+        shape: SignalShape,
+        coordinates: list[tuple[str, str]],
+    ) -> list[Signal]:
+        """Expressions of one vector signal; appends its parameters to the vector or its data to d."""
+        if shape.kind == "none":
+            return [CONSTANT_ZERO] * len(coordinates)
+        if shape.kind == "table":
+            return self._table(table, shape, [key for key, _ in coordinates])
+        one = self._via_points if shape.kind == "polynomial" else self._sines
+        return [one(table, key, unit, count) for (key, unit), count in zip(coordinates, shape.terms, strict=True)]
+
+    def _table(self, table: SignalTableName, shape: SignalShape, coordinates: list[str]) -> list[Signal]:
+        tau = ca.SX.sym(f"{table}_tau")
+        channels = tuple(i for i, count in enumerate(shape.terms) if count)
+        start = sum(symbol.numel() for symbol in self._data)
+        self.tables += (TableLayout(table, start, channels),)
+        blocks = {i: ca.SX.sym(f"{table}_{coordinates[i]}", 4) for i in channels}
+        self._data += [tau, *blocks.values()]
+        return [formulas.cubic(tau, blocks[i]) if i in blocks else CONSTANT_ZERO for i in range(len(coordinates))]
+
+    def _via_points(self, table: str, key: str, unit: str, count: int) -> Signal:
+        def points(name: str, unit: str, meaning: str) -> list[ca.SX]:
+            return [
+                self._vector.scalar(
+                    f"{table}.{key}.{name}.{k}", f"{table}_{key}_{name}_{k}", unit, 0.0, f"{meaning} {k} of {key}"
+                )
+                for k in range(count)
+            ]
+
+        return formulas.via_points(self.t, points("t", "s", "time of via point"), points("q", unit, "via point"))
+
+    def _sines(self, table: str, key: str, unit: str, count: int) -> Signal:
+        offset = ca.SX(0)
+        dotted = f"{table}.{key}"
+        if table == "reference":
+            offset = self._vector.scalar(
+                f"{dotted}.offset", f"{table}_{key}_offset", unit, 0.0, f"offset of the {key} reference"
+            )
+            dotted += ".terms"
+        terms = [
+            (
+                self._vector.scalar(
+                    f"{dotted}.{k}.amplitude",
+                    f"{table}_{key}_{k}_amplitude",
+                    unit,
+                    0.0,
+                    f"amplitude of {key} term {k}",
+                ),
+                self._vector.scalar(
+                    f"{dotted}.{k}.omega",
+                    f"{table}_{key}_{k}_omega",
+                    "rad/s",
+                    0.0,
+                    f"angular frequency of {key} term {k}",
+                ),
+                self._vector.scalar(
+                    f"{dotted}.{k}.phase",
+                    f"{table}_{key}_{k}_phase",
+                    "rad",
+                    0.0,
+                    f"phase of {key} term {k}",
+                ),
+            )
+            for k in range(count)
+        ]
+        return formulas.sine_sum(self.t, offset, terms)

@@ -1,0 +1,61 @@
+"""What of a system is structure and no number: a new structure is a new kernel, a new number is not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from springline.model.control import LogForm, SurfaceExponents
+from springline.model.drive import DriveKind
+
+SignalKind = Literal["none", "sine", "polynomial", "table"]
+MotorStart = Literal["unloaded", "equilibrium", "given"]
+JointStart = Literal["given", "reference"]
+
+
+@dataclass(frozen=True, slots=True)
+class SignalShape:
+    """The shape of a vector signal: its kind, and what it has per coordinate.
+
+    terms  sine: number of terms; polynomial: number of via points; table: 1 with a column, 0 (zero) without
+    """
+
+    kind: SignalKind = "none"
+    terms: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """Everything about a system that is no number: a new structure is a new kernel, a new number is not.
+
+    controller     by name; law, log_form and exponents are those of one that has a reaching law
+    start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
+    effects        properties of sensors and motors, by name, in the order in which they act
+    initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
+                   told; on the reference they start with springs that carry the arm along it
+    """
+
+    mechanism: str = "transfer_manipulator"
+    law: str = "variable_power_log"
+    log_form: LogForm = "power"
+    exponents: SurfaceExponents = field(default_factory=SurfaceExponents)
+    reference: SignalShape = SignalShape("sine", (1, 1))
+    base_motion: SignalShape = SignalShape("none", (0, 0, 0))
+    initial_motor: MotorStart = "unloaded"
+    drive: DriveKind = "elastic"
+    start: JointStart = "given"
+    integrator: str = "rk4"
+    effects: tuple[str, ...] = ()
+    controller: str = "terminal_sliding"
+
+
+@dataclass(frozen=True, slots=True)
+class TableLayout:
+    """Where a table stands in the data vector d: d[start] is tau (s from the knot), then four coefficients a channel.
+
+    channels: indices of the signal's coordinates that have a column, in the order of their coefficients.
+    """
+
+    signal: Literal["reference", "base_motion"]
+    start: int
+    channels: tuple[int, ...]

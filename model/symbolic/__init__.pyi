@@ -1,0 +1,4 @@
+from .linear import as_written as as_written
+from .linear import over as over
+from .linear import solve_spd as solve_spd
+from .normal_form import collect as collect

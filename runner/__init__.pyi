@@ -1,0 +1,5 @@
+from .files import InputError as InputError
+from .run import simulate as simulate
+from .scenario import load_scenario as load_scenario
+from .scenario import without_code as without_code
+from .sweep import batch as batch

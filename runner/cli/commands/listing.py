@@ -1,0 +1,152 @@
+"""`springline list`: what there is to choose from, with units, defaults and meaning."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from springline.runner.cli.terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from springline.model.parameters import Joint, Parameter
+
+Row = dict[str, Any]
+
+
+class What(StrEnum):
+    """The lists."""
+
+    mechanisms = "mechanisms"
+    controllers = "controllers"
+    laws = "laws"
+    parameters = "parameters"
+    scenarios = "scenarios"
+    sweeps = "sweeps"
+
+
+def list_(
+    what: Annotated[What, typer.Argument(help="Which list.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
+) -> None:
+    """List mechanisms, controllers, laws, parameters, packaged scenarios or sweeps."""
+    rows = {
+        "mechanisms": mechanisms,
+        "controllers": controllers,
+        "laws": laws,
+        "parameters": parameters,
+        "scenarios": scenarios,
+        "sweeps": sweeps,
+    }[what.value]()
+    if as_json:
+        print_json("list", rows, {})
+        return
+    columns = list(rows[0])
+    print_table(columns, [[_text(row[column]) for column in columns] for row in rows])
+
+
+def mechanisms() -> list[Row]:
+    """Every mechanism with its joints and parameters."""
+    from springline.model.mechanisms import MECHANISMS
+
+    return [
+        {
+            "name": mechanism.name,
+            "joints": [f"{joint.name} [{joint.unit}]" for joint in mechanism.joints],
+            "parameters": [
+                item.name for item in (*mechanism.parameters, *mechanism.motor_inertia, *mechanism.stiffness)
+            ],
+        }
+        for mechanism in MECHANISMS.values()
+    ]
+
+
+def controllers() -> list[Row]:
+    """Every controller with its own parameters, beside those of [control] that all have."""
+    from springline.model.control import CONTROLLERS
+
+    return [
+        {"name": item.name, "title": item.title, "parameters": [parameter.name for parameter in item.parameters]}
+        for item in CONTROLLERS.values()
+    ]
+
+
+def laws() -> list[Row]:
+    """Every reaching law with its parameters."""
+    from springline.model.control import LAWS
+
+    return [
+        {"name": law.name, "title": law.title, "parameters": [item.name for item in law.parameters]}
+        for law in LAWS.values()
+    ]
+
+
+def parameters() -> list[Row]:
+    """Every parameter of mechanism, drive and controller: scenario key, unit, default, bounds, meaning.
+
+    What differs from joint to joint has a list of defaults, and of units.
+    """
+    from springline.model.drive import EPSILON
+    from springline.model.mechanisms import MECHANISMS
+    from springline.model.system import control_parameters
+
+    rows: dict[str, Row] = {}
+    for mechanism in MECHANISMS.values():
+        tables = {
+            "mechanism": mechanism.parameters,
+            "drive": (*mechanism.motor_inertia, *mechanism.stiffness, EPSILON),
+            "control": control_parameters(mechanism),
+        }
+        for table, declared in tables.items():
+            for row in _rows(table, declared, mechanism.joints):
+                rows.setdefault(row["key"], row)
+    return list(rows.values())
+
+
+def scenarios() -> list[Row]:
+    """Every packaged scenario with the comment that it begins with."""
+    from springline.runner.scenario import packaged_scenarios
+
+    return _titled("", packaged_scenarios())
+
+
+def sweeps() -> list[Row]:
+    """Every packaged sweep with the comment that it begins with."""
+    from springline.runner.scenario import packaged_sweeps
+
+    return _titled("sweeps/", packaged_sweeps())
+
+
+def _titled(folder: str, names: Iterable[str]) -> list[Row]:
+    from springline.runner.scenario import scenarios_folder
+
+    files = {name: scenarios_folder().joinpath(*f"{folder}{name}.toml".split("/")) for name in names}
+    return [{"name": name, "title": _title(file.read_text("utf-8"))} for name, file in files.items()]
+
+
+def _title(text: str) -> str:
+    first = text.partition("\n")[0]
+    return first.lstrip("# ") if first.startswith("#") else ""
+
+
+def _rows(table: str, declared: tuple[Parameter, ...], joints: tuple[Joint, ...]) -> Iterator[Row]:
+    from springline.runner.scenario import unit_text
+
+    for item in declared:
+        units = [item.unit_of(joint) for joint in joints] if item.per_joint else [unit_text(item.unit, joints)]
+        yield {
+            "key": f"{table}.{item.name}",
+            "unit": units[0] if len(set(units)) == 1 else units,
+            "default": list(item.defaults(joints)) if item.per_joint else item.defaults(joints)[0],
+            "bounds": str(item.bounds),
+            "meaning": item.meaning,
+        }
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(_text(item) for item in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

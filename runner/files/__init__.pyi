@@ -1,0 +1,11 @@
+from .errors import InputError as InputError
+from .errors import Problem as Problem
+from .errors import shortened as shortened
+from .errors import unknown as unknown
+from .storage import parquet_bytes as parquet_bytes
+from .storage import table_files as table_files
+from .storage import units as units
+from .storage import write_folder as write_folder
+from .toml_text import document_text as document_text
+from .toml_text import read_toml as read_toml
+from .toml_text import value_text as value_text

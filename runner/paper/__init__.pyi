@@ -1,0 +1,2 @@
+from .cases import GROUPS as GROUPS
+from .reproduction import reproduce as reproduce

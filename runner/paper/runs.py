@@ -1,0 +1,323 @@
+"""Every run that repeats the paper, once with the scenarios' step and once with half of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from os import cpu_count
+from threading import Lock
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pyarrow as pa
+
+from springline.codegen.kernel import ONE_RUN, KernelSpec, LoopSettings, Watch, kernel
+from springline.codegen.program import program
+from springline.model import theory
+from springline.model.control import SurfaceExponents
+from springline.model.structure import Structure
+from springline.model.system import System
+from springline.runner.files import InputError, Problem
+from springline.runner.paper.cases import LAWS, cases
+from springline.runner.paper.evidence import Evidence, Theory
+from springline.runner.paper.measured import Floats, Measured
+from springline.runner.run import Crew, Progress, Result, results, simulate, trajectory_schema
+from springline.runner.scenario import Scenario, load_scenario
+
+Overrides = Mapping[str, Any]
+
+ROW_INTERVAL = 2e-4
+"""Time between trajectory rows, s: 30 of them in a period of the springs' slowest oscillation."""
+
+_EVERY = 5
+"""Rows between two at which the disturbance is evaluated: it does not change much in a millisecond."""
+
+LINEAR_GAIN = 5.0
+"""1/s. Coefficient c of the linear surface sigma = de/dt + c e of Figure 5, which the paper does not publish: ours."""
+
+E8_SHAKE: Overrides = {
+    "base_motion.kind": "sine",
+    "base_motion.shake": [{"amplitude": 0.07, "omega": 11.0}, {"amplitude": 0.0, "omega": 0.0}],
+}
+"""The shake under which the two readings of the logarithms are compared (E8): 0.07 sin 11t. With a second, empty term
+these runs have the structure of Table 2's, and need no kernels of their own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """A run besides Table 2's: what it varies, in words and as overrides of a packaged scenario."""
+
+    name: str
+    scenario: str
+    overrides: Overrides
+
+
+LITERAL: Mapping[str, Experiment] = {
+    "unlimited": Experiment("δ = 0, no limits", "paper/as_printed", {}),
+    "limited": Experiment("δ = 0, a_max = 200", "paper/as_printed", {"control.a_max": 200.0}),
+}
+"""The law as it is printed: no boundary layer."""
+
+READINGS: Mapping[str, Experiment] = {
+    "power": Experiment("logarithms to a power", "paper/nominal", E8_SHAKE),
+    "base": Experiment("logarithms to a base", "paper/nominal", {**E8_SHAKE, "control.log_form": "base"}),
+    "double_power": Experiment("double power law", "paper/nominal", {**E8_SHAKE, "control.law": "double_power"}),
+    "power_law": Experiment("power law", "paper/nominal", {**E8_SHAKE, "control.law": "power"}),
+}
+"""The two readings of the logarithms of (18), and the traditional laws beside them."""
+
+LAYERS: Mapping[str, Experiment] = {
+    f"{delta:g}": Experiment(f"δ = {delta:g}", "paper/nominal", {"control.delta": delta})
+    for delta in (0.005, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04, 0.05, 0.1)
+}
+"""Width of the boundary layer, base at rest."""
+
+LIMITS: Mapping[str, Experiment] = {
+    f"{a_max:g}": Experiment(f"a_max = {a_max:g}", "paper/nominal", {"control.a_max": a_max})
+    for a_max in (50.0, 100.0, 200.0, 500.0, 1000.0, 1500.0, float("inf"))
+}
+"""Limit on the reaching law, base at rest."""
+
+Key = tuple[Any, ...]
+"""What a run is for: ("case", scenario name, whether the step is halved), or an experiment's likewise."""
+
+Twice = tuple[Measured, Measured]
+"""A run with the scenario's step, and with half of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """All runs of a reproduction.
+
+    groups     groups of Table 2 that were run
+    changes    overrides of all scenarios, by dotted key
+    whole      whether the rest was run too: Figures 4 to 7 and the sections on what the paper leaves open
+    scenarios  scenario name -> scenario of each case
+    evidence, halved  what the claims look at, with the scenarios' step and with half of it
+    literal, readings, layers, limits  the experiments of these names; empty unless `whole`
+    """
+
+    groups: tuple[int, ...]
+    changes: Overrides
+    whole: bool
+    scenarios: Mapping[str, Scenario]
+    evidence: Evidence
+    halved: Evidence
+    literal: Mapping[str, Twice]
+    readings: Mapping[str, Twice]
+    layers: Mapping[str, Twice]
+    limits: Mapping[str, Twice]
+
+
+def study(
+    groups: Sequence[int], *, whole: bool, changes: Overrides | None = None, progress: Progress | None = None
+) -> Study:
+    """Run everything that a reproduction of these groups needs.
+
+    changes   overrides of all scenarios; where an experiment varies the same key, the experiment's counts
+    progress  called now and then with the share that is done (0 .. 1)
+    Raises InputError for overrides that a scenario refuses or that the report has no analysis for, ValueError for a
+    group that the paper does not have, ToolchainError if there is no C compiler.
+    """
+    changed = dict(changes or {})
+    names = [case.scenario for case in cases(groups)]
+    tables = (LITERAL, READINGS, LAYERS, LIMITS) if whole else ()
+    wanted: dict[Key, tuple[str, Overrides]] = {("case", name): (name, {}) for name in names}
+    wanted |= {
+        (number, key): (experiment.scenario, experiment.overrides)
+        for number, table in enumerate(tables)
+        for key, experiment in table.items()
+    }
+    scenarios = {
+        (*key, half): _scenario(name, {**changed, **overrides}, half)
+        for key, (name, overrides) in wanted.items()
+        for half in (False, True)
+    }
+    linear = (
+        {
+            (law, half): _scenario("paper/nominal", {**changed, "control.law": law}, half)
+            for law in LAWS
+            for half in (False, True)
+        }
+        if whole
+        else {}
+    )
+    runs = _run_all({**scenarios, **{("linear", *key): scenario for key, scenario in linear.items()}}, progress)
+
+    def evidence(half: bool) -> Evidence:
+        measured = {name: runs["case", name, half] for name in names}
+        return Evidence(
+            runs=measured,
+            theory={
+                name: theory_of(scenarios["case", name, half], run)
+                for name, run in measured.items()
+                if run.status == "ok"
+            },
+            laws={law: reaching_law(load_scenario("paper/nominal", {**changed, "control.law": law})) for law in LAWS}
+            if whole
+            else {},
+            linear={law: runs["linear", law, half] for law in LAWS} if whole else {},
+        )
+
+    def experiments(number: int, table: Mapping[str, Experiment]) -> Mapping[str, Twice]:
+        return {key: (runs[number, key, False], runs[number, key, True]) for key in table} if whole else {}
+
+    return Study(
+        tuple(sorted(set(groups))),
+        changed,
+        whole,
+        {name: scenarios["case", name, False] for name in names},
+        evidence(False),
+        evidence(True),
+        *(experiments(number, table) for number, table in enumerate((LITERAL, READINGS, LAYERS, LIMITS))),
+    )
+
+
+def _scenario(name: str, overrides: Overrides, half: bool) -> Scenario:
+    plain = load_scenario(name, dict(overrides))
+    if plain.signal_tables:
+        text = "the report's bounds need signals that are formulas: expected another kind than a table"
+        raise InputError(Problem(f"override of {name}", "", text))
+    step = plain.step / 2 if half else plain.step
+    return load_scenario(
+        name, {**overrides, "simulation.step": step, "simulation.output_every": max(1, round(ROW_INTERVAL / step))}
+    )
+
+
+def _run_all(scenarios: Mapping[Key, Scenario], progress: Progress | None) -> dict[Key, Measured]:
+    """Run all scenarios, those that are the same only once; kernels are compiled side by side."""
+    jobs: dict[Structure, dict[object, list[Key]]] = {}
+    for key, scenario in scenarios.items():
+        structure = _linear_structure(scenario) if key[0] == "linear" else scenario.structure()
+        program(structure)  # symbolic work belongs to one thread: CasADi's options are global
+        same = (scenario.values().tobytes(), scenario.step, scenario.steps, scenario.output_every)
+        jobs.setdefault(structure, {}).setdefault(same, []).append(key)
+    total = sum(len(runs) for runs in jobs.values())
+    done: dict[Key, Measured] = {}
+    guard, finished = Lock(), 0
+
+    def work(runs: Iterable[list[Key]], watch: Watch) -> None:
+        nonlocal finished
+        for keys in runs:
+            if watch.stop.value:
+                return
+            scenario = scenarios[keys[0]]
+            result = _linear(scenario) if keys[0][0] == "linear" else simulate(scenario)
+            with guard:  # CasADi again
+                run = measure(scenario, result)
+                if any(key[0] == "case" for key in keys):
+                    run = with_velocities(scenario, run)
+                done.update((key, run) for key in keys)
+                finished += 1
+
+    def report() -> None:
+        if progress is not None:
+            progress(finished / total)
+
+    with Crew(cpu_count() or 1) as crew:
+        results([crew.begin(partial(work, list(runs.values()))) for runs in jobs.values()], report)
+    return done
+
+
+def measure(scenario: Scenario, result: Result) -> Measured:
+    """A Result as it is judged, with NaN for metrics that do not exist."""
+    columns = {name: result.trajectory[name].to_numpy() for name in result.trajectory.column_names}
+    (row,) = result.metrics.to_pylist()
+    metrics = {key: float("nan") if value is None else float(value) for key, value in row.items() if key != "status"}
+    return Measured(columns, metrics, result.status, result.message)
+
+
+def with_velocities(scenario: Scenario, run: Measured) -> Measured:
+    """The run with the wished velocities and their errors beside its columns."""
+    system, columns = scenario.system(), dict(run.columns)
+    wished = _signals(system, scenario, run["t"])[system.n : 2 * system.n]
+    for joint, rate in zip(system.joints, wished, strict=True):
+        columns[f"dq1d_{joint.name}"] = rate
+        columns[f"velocity_error_{joint.name}"] = rate - columns[f"dq1_{joint.name}"]
+    return replace(run, columns=columns)
+
+
+def _signals(system: System, scenario: Scenario, t: Floats) -> Floats:
+    """w = [q1d, dq1d, ddq1d, b, db, ddb] along time, one column a sample (analytic signals only: no tables)."""
+    values: Floats = system.function("signals")(t[None, :], ca.DM.zeros(0, 1), scenario.values()).full()
+    return values
+
+
+def reaching_law(scenario: Scenario) -> Callable[[Floats], Floats]:
+    """d sigma / dt that the scenario's law asks for, without the limit a_max, as a function of an array of sigma."""
+    system, structure, values = scenario.system(), scenario.structure(), scenario.values()
+    law = system.function(f"law_{structure.law}")
+
+    def rate(sigma: Floats) -> Floats:
+        asked: Floats = law(np.atleast_1d(sigma)[None, :], values).full()[0]
+        return asked
+
+    return rate
+
+
+def theory_of(scenario: Scenario, run: Measured) -> Theory:
+    """The bounds of section 6 for one run, with S0 measured along it, and where the proof does not reach it (E9)."""
+    system, structure, values = scenario.system(), scenario.structure(), scenario.values()
+    p = dict(zip((slot.key for slot in system.slots), values, strict=True))
+    per_joint = range(system.n)
+    q, dq, sigma = (
+        np.array([run[f"{name}_{joint.name}"][::_EVERY] for joint in system.joints]) for name in ("q1", "dq1", "sigma")
+    )
+    w = _signals(system, scenario, run["t"][::_EVERY])
+    base = np.split(w[3 * system.n :], 3)
+    disturbance = system.function("base_disturbance")(*base, q, dq, values).full()
+    mass = system.function("slow_mass")(q, values).full()  # H of each sample side by side
+    felt = theory.felt_acceleration(mass.reshape(system.n, -1, system.n).swapaxes(0, 1), disturbance)
+    margin = theory.margin(felt, p["control.k1"])
+    rate = reaching_law(scenario)
+    limits = np.array([p[f"control.a_max.{i}"] for i in per_joint])
+    clipped = bool(np.any(np.abs([rate(row) for row in sigma]) > limits[:, None]))
+    bounds = theory.settling_bounds(
+        sigma[:, 0],
+        margin.c1,
+        p["control.zeta"],
+        [p[f"control.mu.{i}"] for i in per_joint],
+        p["control.lambda"],
+        structure.exponents,
+    )
+    delta = p["control.delta"]
+
+    def clipped_law(limit: float) -> Callable[[float], float]:
+        return lambda s: min(abs(float(rate(np.array([s]))[0])), limit)
+
+    residual = [
+        theory.residual_set(clipped_law(limit), float(bound))
+        for limit, bound in zip(limits, margin.per_joint, strict=True)
+    ]
+    return Theory(
+        margin,
+        bounds,
+        theory.gaps(margin, delta, clipped, structure.law),
+        tuple(residual),
+        theory.tail_rate(p["control.lambda"], delta, structure.exponents),
+    )
+
+
+def _linear_structure(scenario: Scenario) -> Structure:
+    return replace(scenario.structure(), exponents=SurfaceExponents(l=1, m=1, p=1, r=3))
+
+
+def _linear(scenario: Scenario) -> Result:
+    """The scenario with the linear surface sigma = de/dt + c e, which no scenario can ask for."""
+    structure = _linear_structure(scenario)
+    system = program(structure).system
+    values = scenario.values().copy()
+    for i, slot in enumerate(system.slots):
+        if slot.key.startswith("control.mu."):
+            values[i] = LINEAR_GAIN
+        if slot.key == "control.lambda":
+            values[i] = 0.0
+    settings = LoopSettings(scenario.steps, scenario.step, scenario.bound, output_every=scenario.output_every)
+    runs = kernel(KernelSpec(structure, options=ONE_RUN)).run(values[None, :], settings)
+    assert runs.trajectory is not None
+    trajectory = pa.Table.from_arrays(
+        [pa.array(column) for column in runs.trajectory[0].T], schema=trajectory_schema(system)
+    )
+    return Result(trajectory, pa.table({"status": ["ok"]}), "ok", "")

@@ -1,0 +1,82 @@
+"""Tables of the documentation that are printed from the declarations in springline.model.quantities.
+
+    python -m runner.report.docs_tables [--write]
+
+Prints the columns of a trajectory and the metrics of a run of the packaged arm; --write (`make docs-tables`) puts them
+into docs/scenarios.md, between the comments that name them. The text around them is written by hand.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from springline.model.parameters import Joint
+from springline.model.quantities import METRICS, Quantity
+from springline.model.system import System
+
+SCENARIOS_PAGE = Path(__file__).parents[2] / "docs" / "scenarios.md"
+
+
+def put(page: str, name: str, table: str) -> str:
+    """`page` with `table` (lines that end in a newline) between the comments "name: begin" and "name: end".
+
+    Raises ValueError if the page does not have these two comments, in this order.
+    """
+    begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->\n"
+    before, found, rest = page.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not (found and closed):
+        raise ValueError(f"no place for the table {name!r}: expected {begin.strip()} and, below it, {end.strip()}")
+    return before + begin + table + end + after
+
+
+def table(quantities: Iterable[Quantity], joints: Sequence[Joint]) -> str:
+    """Name, unit and meaning of what these quantities hold, in Markdown; one row for all joints."""
+    rows = ["| column | unit | meaning |", "|---|---|---|"]
+    for quantity in quantities:
+        found = quantity.entries(joints)
+        if quantity.per == "joint":
+            units = ", ".join(dict.fromkeys(entry.unit for entry in found))
+            shown = [(f"{quantity.name}_<joint>", units, quantity.meaning)]
+        else:
+            shown = [(entry.name, entry.unit, entry.meaning) for entry in found]
+        rows += [f"| `{name}` | {cell(unit)} | {cell(meaning)} |" for name, unit, meaning in shown]
+    return "\n".join(rows) + "\n"
+
+
+def cell(text: str) -> str:
+    """Plain text as it stands in a cell of a table in Markdown."""
+    return text.replace("|", r"\|").replace("^2", "²")
+
+
+def tables() -> dict[str, str]:
+    """The tables by name."""
+    system = System()
+    return {"trajectory": table(system.columns, system.joints), "metrics": table(METRICS, system.joints)}
+
+
+def written(page: str) -> str:
+    """The page with its tables as they should be. Raises ValueError if it has no place for one."""
+    for name, text in tables().items():
+        page = put(page, name, text)
+    return page
+
+
+def main() -> int:
+    """Command line; the exit code is 2 where there is no page to write."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/scenarios.md")
+    if not parser.parse_args().write:
+        sys.stdout.write("\n".join(tables().values()))
+        return 0
+    if not SCENARIOS_PAGE.is_file():
+        parser.error(f"there is no {SCENARIOS_PAGE}: run it in a checkout")
+    SCENARIOS_PAGE.write_text(written(SCENARIOS_PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,15 @@
+from .columns import field as field
+from .columns import metrics_schema as metrics_schema
+from .columns import metrics_table as metrics_table
+from .columns import trajectory_schema as trajectory_schema
+from .crew import Crew as Crew
+from .crew import REFRESH as REFRESH
+from .crew import results as results
+from .figures import run_figures as run_figures
+from .limits import refuse_large as refuse_large
+from .limits import refuse_rows as refuse_rows
+from .limits import row_size as row_size
+from .settings import loop_settings as loop_settings
+from .simulation import Progress as Progress
+from .simulation import Result as Result
+from .simulation import simulate as simulate

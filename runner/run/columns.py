@@ -1,0 +1,36 @@
+"""Columns of trajectories and metrics as Arrow tables, with units."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+
+from springline.codegen.kernel import METRICS, STATUS, Runs
+from springline.model.system import System
+
+
+def field(name: str, unit: str, kind: pa.DataType | None = None) -> pa.Field:
+    """An Arrow field that carries its SI unit in its metadata."""
+    return pa.field(name, kind or pa.float64(), metadata={"unit": unit})
+
+
+def trajectory_schema(system: System) -> pa.Schema:
+    """Columns of a trajectory, in the order of the loop's rows."""
+    return pa.schema([field(entry.name, entry.unit) for entry in system.trajectory])
+
+
+def metrics_schema(system: System) -> pa.Schema:
+    """Columns of a table of metrics, metric by metric, then status and t_end."""
+    judged = [field(entry.name, entry.unit) for entry in system.metrics]
+    return pa.schema([*judged, field("status", "", pa.string()), field("t_end", "s")])
+
+
+def metrics_table(system: System, runs: Runs) -> pa.Table:
+    """Metrics of all runs, one row each."""
+    columns: list[pa.Array] = []
+    for k in range(len(METRICS)):
+        for j in range(system.n):
+            values = runs.metrics[:, j, k]
+            columns.append(pa.array(values, mask=np.isnan(values)))
+    status = pa.array([STATUS[i] for i in runs.status], pa.string())
+    return pa.Table.from_arrays([*columns, status, pa.array(runs.end_time)], schema=metrics_schema(system))

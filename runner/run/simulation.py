@@ -1,0 +1,108 @@
+"""One scenario in, one Result out: trajectory and metrics as Arrow tables with units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from springline.codegen.kernel import (
+    CHATTERING,
+    METRICS,
+    ONE_RUN,
+    STATUS,
+    Engine,
+    KernelSpec,
+    LoopSettings,
+    Runs,
+    chatters,
+    kernel,
+    quantity_name,
+)
+from springline.model.parameters import Joint
+from springline.model.quantities import entries
+from springline.model.system import System
+from springline.runner.run.columns import metrics_table, trajectory_schema
+from springline.runner.run.crew import Crew, results
+from springline.runner.run.limits import refuse_large
+from springline.runner.run.settings import loop_settings
+from springline.runner.scenario import Scenario, expect_scenario, kernel_tables
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What a run gave.
+
+    trajectory  columns as System.trajectory has them: t, the state, q1d_, e_, sigma_, U_ per joint, the base
+    metrics     one row, columns as System.metrics has them; null where there is none
+    status      "ok", "diverged" or "out_of_bounds"
+    message     one sentence: for a run that stopped, the quantity and the time at which it left its bound; for one that
+                chatters, how much
+    """
+
+    trajectory: pa.Table
+    metrics: pa.Table
+    status: str
+    message: str
+
+
+def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tuple[str, str]:
+    """Status and message of one run."""
+    status, end = STATUS[runs.status[run]], runs.end_time[run]
+    if status == "ok":
+        return status, f"done: {end:g} s in {settings.steps} steps{_chatter_text(system.joints, runs, run)}"
+    place = int(runs.quantity[run])
+    quantity = quantity_name(system, place)
+    if place >= len(system.trajectory) - 1:  # no column has its name
+        quantity = f"the {system.judged[place].meaning}"
+    left = "the finite numbers" if status == "diverged" else f"its bound (|{quantity}| <= {settings.bound:g})"
+    states = (*entries(system.drive.state, system.joints), *system.memory)
+    if quantity in {entry.name for entry in states}:
+        when = f"at t = {end + settings.step:g} s; results end at t = {end:g} s"
+    else:  # the state that it was computed from is still there
+        when = f"at t = {end:g} s, where results end"
+    return status, f"{status}: {quantity} left {left} {when}"
+
+
+def _chatter_text(joints: Sequence[Joint], runs: Runs, run: int) -> str:
+    """Of a run that chatters, which command does it and how much; "" for a calm one."""
+    chatter = runs.metrics[run, :, METRICS.index("chatter")]
+    judged = zip(joints, chatter, chatters(chatter, runs.end_time[run]), strict=True)
+    found = [f"U_{joint.name} by {value:.3g} 1/s" for joint, value, does in judged if does]
+    return f"; chattering: {' and '.join(found)} (calm is up to {CHATTERING:g})" if found else ""
+
+
+def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress | None = None) -> Result:
+    """Simulate a scenario with a kernel in which every number is tunable (a changed number compiles nothing).
+
+    engine    "lanes", or "casadi" for the C that CasADi prints; the results are the same to the last bit
+    progress  called now and then with the share that is done (0 .. 1)
+    Raises TypeError for what is no Scenario, InputError (a ValueError) if the trajectory would have more than 10
+    million rows or not fit into memory, ValueError for an unknown engine, ToolchainError if there is no C compiler.
+    """
+    expect_scenario(scenario)
+    options = replace(ONE_RUN, engine=engine)
+    refuse_large(scenario)
+    loop = kernel(KernelSpec(scenario.structure(), scenario.control_every > 0, options=options))
+    settings = loop_settings(scenario, trajectory=True)
+    tables = kernel_tables(scenario.tables())
+    values = scenario.values()[None, :]
+
+    def report() -> None:
+        if progress is not None:
+            progress(crew.underway() / settings.steps)
+
+    with Crew(1) as crew:  # a thread of its own, so that Ctrl-C and a progress bar reach a long run
+        [runs] = results([crew.begin(lambda watch: loop.run(values, settings, tables, watch=watch))], report)
+    system = scenario.system()
+    assert runs.trajectory is not None and runs.rows is not None
+    rows = runs.trajectory[0, : runs.rows[0]]
+    trajectory = pa.Table.from_arrays([pa.array(column) for column in rows.T], schema=trajectory_schema(system))
+    status, message = outcome(system, runs, 0, settings)
+    return Result(trajectory, metrics_table(system, runs), status, message)

@@ -1,0 +1,561 @@
+"""Scenarios: a TOML file, checked as a whole, then everything the model and the loop want to know of it."""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from os import PathLike
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from springline.codegen.kernel import lanes
+from springline.codegen.numbers import doubles
+from springline.codegen.program import program
+from springline.model.base import COORDINATES
+from springline.model.control import CONTROLLERS, LAWS, LogForm, SurfaceExponents
+from springline.model.drive import DRIVES, DriveKind
+from springline.model.mechanisms import MECHANISMS
+from springline.model.parameters import POSITIVE, Bounds
+from springline.model.structure import MotorStart, SignalKind, SignalShape, Structure
+from springline.model.system import System
+from springline.runner.files import InputError, Problem, document_text, read_toml, shortened, unknown
+from springline.runner.scenario import schema
+from springline.runner.scenario.checking import Document, resolve
+from springline.runner.scenario.dotted import expect_keys, flat, plain, replaced, scale_key
+from springline.runner.scenario.locate import expect_kind, read_scenario, relative_path
+from springline.runner.scenario.splines import Spline
+from springline.runner.scenario.user_code import UserClass, canonical_reference, load_class, read_class, told
+
+Floats = NDArray[np.float64]
+# Relative to the largest eigenvalue: a mass matrix below this is singular to the precision of what is computed with it.
+_SINGULAR = 1e-12
+_BARE_WORD = re.compile(r"([^\W\d]|\.{0,2}/)[\w.:/+-]*")
+
+Slots = dict[str, float | Floats]
+"""Slot key -> one number for all runs, or a column (runs,) of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class NumericKey:
+    """A number that may differ from run to run within one structure.
+
+    leaves  the entries of the scenario that it sets: itself, or one for each joint
+    """
+
+    unit: str
+    bounds: Bounds
+    meaning: str
+    leaves: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A scenario with every default filled in; immutable.
+
+    Two are equal if their documents and the contents of their signal tables are, wherever the files of these lie.
+
+    source         the file or packaged name it was loaded from
+    folder         what relative paths in overrides count from: the working directory, or the folder of the sweep
+    document       its tables as plain data; read it, do not change it
+    signal_tables  its signals from CSV files, in the order of System.tables
+    notes          what was made of the CSV files, a sentence each, for people
+    code           classes of users' files that it names
+    """
+
+    source: str
+    folder: Path
+    document: Document
+    signal_tables: tuple[Spline, ...]
+    notes: tuple[str, ...] = ()
+    code: tuple[UserClass, ...] = ()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scenario) and self._identity == other._identity
+
+    def __hash__(self) -> int:
+        return hash(self._identity)
+
+    @cached_property
+    def _identity(self) -> tuple[str, tuple[Spline, ...]]:
+        return document_text(_with_paths(self.document, lambda path: "", self.registered)), self.signal_tables
+
+    # What the loop is told
+
+    @property
+    def step(self) -> float:
+        """Step of the integrator, s."""
+        return float(self._simulation["step"])
+
+    @property
+    def steps(self) -> int:
+        """Number of steps of a complete run."""
+        return round(float(self._simulation["duration"]) / self.step)
+
+    @property
+    def control_every(self) -> int:
+        """Steps per sample of the control; 0 means continuous."""
+        control = self.document["control"]
+        return round(control["period"] / self.step) if control["mode"] == "sampled" else 0
+
+    @property
+    def integrator(self) -> str:
+        """Name of the integrator."""
+        return str(self._simulation["integrator"])
+
+    @property
+    def output_every(self) -> int:
+        """Steps per row of the trajectory."""
+        return int(self._simulation["output_every"])
+
+    @property
+    def bound(self) -> float:
+        """Largest |x_i| before a run is stopped, SI units."""
+        return float(self._simulation["bound"])
+
+    @property
+    def response_band(self) -> float:
+        """Fraction of |e_i(0)| that defines the response time; 0 where an absolute error does."""
+        return float(self._simulation.get("response_band", 0.0))
+
+    @property
+    def settling_band(self) -> float:
+        """Fraction of |e_i(0)| that defines the settling time; 0 where an absolute error does."""
+        return float(self._simulation.get("settling_band", 0.0))
+
+    @property
+    def response_error(self) -> float:
+        """|e_i| that defines the response time, SI; 0 where the band does."""
+        return float(self._simulation.get("response_error", 0.0))
+
+    @property
+    def settling_error(self) -> float:
+        """|e_i| that defines the settling time, SI; 0 where the band does."""
+        return float(self._simulation.get("settling_error", 0.0))
+
+    @property
+    def _simulation(self) -> dict[str, Any]:
+        return self.document["simulation"]
+
+    # What the model is told
+
+    def registered(self, name: str) -> str:
+        """What a mechanism, controller or law that the document names is registered as."""
+        return next((user.key for user in self.code if user.reference == name), name)
+
+    def structure(self) -> Structure:
+        """Everything about the scenario that is no number."""
+        control, initial = self.document["control"], self.document["initial"]
+        motor = initial.get("q_motor", "unloaded")
+        mechanism = self.registered(self.document["mechanism"]["name"])
+        joints = [joint.name for joint in MECHANISMS[mechanism].joints]
+        return Structure(
+            mechanism=mechanism,
+            law=self.registered(control["law"]),
+            controller=self.registered(control["controller"]),
+            log_form=cast(LogForm, control["log_form"]),
+            exponents=SurfaceExponents(**{name: control[name] for name in ("l", "m", "p", "r")}),
+            reference=_shape(self.document["reference"], joints),
+            base_motion=_shape(self.document["base_motion"], [c.key for c in COORDINATES]),
+            initial_motor=cast(MotorStart, motor if isinstance(motor, str) else "given"),
+            drive=cast(DriveKind, self.document["drive"]["kind"]),
+            start="reference" if initial.get("on_reference") else "given",
+            integrator=self.integrator,
+        )
+
+    def system(self) -> System:
+        """The System of the structure; the same object for equal structures."""
+        return _system(self.structure())
+
+    def tables(self) -> list[Spline]:
+        """The signal tables, in the order of System.tables."""
+        return list(self.signal_tables)
+
+    def values(self) -> Floats:
+        """The parameter vector p, in the order of System.slots."""
+        return np.array([self._slot(slot.key, self._numbers) for slot in self.system().slots], dtype=np.float64)
+
+    def value_of(self, key: str) -> object:
+        """The value of a dotted key: of a slot of p as the run uses it ("plant.m3"), else of the document.
+
+        Raises InputError if there is no such key.
+        """
+        try:
+            return self._slot(key, self._numbers)
+        except KeyError:
+            entries = dict(flat(self.document))
+        if key not in entries:
+            raise InputError(unknown(self.source, key, "key", key, [*entries, *self.numeric_keys()]))
+        return entries[key]
+
+    def numeric_keys(self) -> dict[str, NumericKey]:
+        """Every number that may vary within the structure, by dotted key.
+
+        "mechanism.m3" moves the controller's value, and the plant's unless the plant has its own; "plant.m3" and
+        "plant.m3.scale" move the plant's alone; "control.mu" moves all joints, "control.mu.0" one.
+        """
+        return dict(_numeric_keys(self.structure()))
+
+    def values_for(self, columns: Mapping[str, ArrayLike]) -> Floats:
+        """One parameter vector a run, (runs, slots), with `columns` as for `slots_for`; one run if there are none."""
+        slots = self.slots_for(columns)
+        return per_run(slots, list(slots), max(np.size(values) for values in slots.values()))
+
+    def columns_for(self, columns: Mapping[str, ArrayLike]) -> dict[str, Floats]:
+        """Columns of numbers, one a run, by numeric key: each as a native float64 array of one dimension.
+
+        Raises InputError for an unknown key, what is no column of numbers, a number that would not stay what it is, and
+        one that is out of bounds.
+        """
+        keys, problems = _numeric_keys(self.structure()), []
+        result = {}
+        for name, values in columns.items():
+            if name not in keys:
+                problems.append(unknown(self.source, name, "numeric key", name, keys))
+                continue
+            try:
+                column = np.atleast_1d(doubles(values))
+            except (TypeError, ValueError) as error:
+                problems.append(Problem(self.source, name, f"expected a column of numbers ({error})"))
+                continue
+            if column.ndim != 1:
+                text = "expected a column of numbers, one for each run"
+                problems.append(Problem(self.source, name, text, f"shape {column.shape}"))
+                continue
+            outside = _first_outside(keys[name].bounds, column)
+            if outside is not None:
+                text = f"run {outside}: expected {schema.number_text(keys[name].bounds, keys[name].unit)}"
+                problems.append(Problem(self.source, name, text, schema.given_text(float(column[outside]))))
+            result[name] = column
+        if problems:
+            raise InputError(*problems)
+        return result
+
+    def slots_for(self, columns: Mapping[str, ArrayLike]) -> Slots:
+        """What each slot is, in the order of System.slots: `columns` as for `columns_for`, all of one length.
+
+        Where two keys set the same entry, the later one counts. Raises InputError.
+        """
+        keys = _numeric_keys(self.structure())
+        numbers: dict[str, float | Floats] = dict(self._numbers)
+        checked = self.columns_for(columns)
+        runs = len(next(iter(checked.values()), ()))
+        text = "expected a column of numbers, one for each run, as long as the others"
+        other = [(name, len(column)) for name, column in checked.items() if len(column) != runs]
+        if other:
+            raise InputError(*(Problem(self.source, name, text, f"{count} numbers") for name, count in other))
+        for name, column in checked.items():
+            for leaf in keys[name].leaves:
+                if leaf.startswith("plant."):  # a value and a factor exclude each other
+                    numbers.pop(leaf.replace(".scale", "") if ".scale" in leaf else scale_key(leaf), None)
+                numbers[leaf] = column
+        return {slot.key: self._slot(slot.key, numbers) for slot in self.system().slots}
+
+    @cached_property
+    def _numbers(self) -> dict[str, float]:
+        """The document's floats by dotted key."""
+        return {key: value for key, value in flat(self.document) if isinstance(value, float)}
+
+    def _slot(self, key: str, numbers: Mapping[str, Any]) -> Any:
+        """The value (or column of values) of one slot; KeyError if it is no slot of this scenario."""
+        table, _, name = key.partition(".")
+        if table == "plant" and key not in numbers:
+            nominal = next((f"{t}.{name}" for t in ("mechanism", "drive") if f"{t}.{name}" in numbers), key)
+            return numbers[nominal] * numbers.get(scale_key(key), 1.0)
+        if name.startswith("K_f.") and not self.document["control"]["fast"]:
+            return 0.0 * numbers[key]
+        if table == "initial" and key not in numbers:
+            return 0.0  # not read: the structure says how the run starts
+        return numbers[key]
+
+    # Changed and written
+
+    def with_overrides(self, overrides: Mapping[str, object], *, read: bool = True) -> Scenario:
+        """This scenario with other values at some dotted keys ("control.mu.0", "plant.m3.scale", …).
+
+        A new kind of reference or base motion, another control mode or mechanism drops what belonged to the old one.
+        Paths count from `folder`. What is going to be changed once more need not `read` its signal files.
+        Raises TypeError for what is no mapping of texts, InputError for whatever a file may not hold either.
+        """
+        expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
+        if not overrides:
+            return self
+        where = _overridden(self.source)
+        overrides = self._canonical(overrides, where)
+        document = self._without_excluded(overrides)
+        problems = []
+        joints = self._joints_with(overrides, where)
+        for key, value in overrides.items():
+            try:
+                document = replaced(document, key.split("."), plain(value), joints)
+            except LookupError as error:
+                problems.append(Problem(where, key, f"there is no such entry: {error.args[0]}"))
+            except (TypeError, ValueError) as error:
+                problems.append(Problem(where, key, f"expected a value that TOML can hold: {error}"))
+        if problems:
+            raise InputError(*problems)
+        changed = Scenario(self.source, self.folder, *resolve(document, where, self.folder, read=read))
+        if read:
+            changed.expect_computable(where)
+        return changed
+
+    def expect_computable(self, where: str) -> None:
+        """Build what users' classes describe, so that what is wrong with them is told before anything else is done.
+
+        where  what the scenario came from, for messages
+        Raises InputError.
+        """
+        if not self.code:
+            return
+        keys = {
+            user: f"{table}.{key}"
+            for user in self.code
+            for table, key in schema.DOORS
+            if self.document[table][key] == user.reference
+        }
+        with told(keys, where):
+            _expect_printable(self.structure())
+        for user, key in keys.items():
+            if key == "mechanism.name" and self.structure().start == "given":
+                mass = np.array(self.system().function("mass_matrix")(self.document["initial"]["q"], self.values()))
+                sizes = np.linalg.eigvalsh(mass) if np.isfinite(mass).all() else np.array([np.nan])
+                if not sizes[0] > _SINGULAR * sizes[-1]:
+                    text = "the mass matrix at the start is not positive definite, its least eigenvalue is"
+                    raise InputError(Problem(where, key, f"{user}: {text} {sizes[0]:.3g}"))
+
+    def _canonical(self, overrides: Mapping[str, object], where: str) -> dict[str, object]:
+        """Overrides that name users' classes as the document does, so that the same one is known for the same."""
+        doors = {f"{table}.{key}" for table, key in schema.DOORS}
+        return {
+            key: canonical_reference(str(value), self.folder, where, key)
+            if key in doors and schema.names_file(value)
+            else value
+            for key, value in overrides.items()
+        }
+
+    def _joints_with(self, overrides: Mapping[str, object], where: str) -> int:
+        """How many joints there are with these overrides; 1 for a mechanism that is unknown, which is told later."""
+        given = overrides.get("mechanism.name")
+        if schema.names_file(given):
+            user = read_class(str(given), where, "mechanism.name")
+            return len(load_class(user, MECHANISMS, where, "mechanism.name").joints)
+        name = self.registered(self.document["mechanism"]["name"]) if given is None else str(given)
+        return len(MECHANISMS[name].joints) if name in MECHANISMS else 1
+
+    def _without_excluded(self, overrides: Mapping[str, object]) -> Document:
+        """A copy of the document without what the overrides exclude."""
+        document = copy.deepcopy(self.document)
+        for table in ("reference", "base_motion"):
+            kind = overrides.get(f"{table}.kind", document[table]["kind"])
+            if kind != document[table]["kind"]:
+                document[table] = {"kind": kind}
+        if overrides.get("control.mode") == "continuous":
+            document["control"].pop("period", None)
+        for name, registry in (("controller", CONTROLLERS), ("law", LAWS)):
+            old = document["control"][name]
+            if overrides.get(f"control.{name}", old) != old:
+                document["control"].pop(registry[self.registered(old)].name, None)
+        mechanism = document["mechanism"]["name"]
+        drive = overrides.get("drive.kind", document["drive"]["kind"])
+        if overrides.get("mechanism.name", mechanism) != mechanism:
+            control = {k: _without_lists(v) for k, v in document["control"].items() if not isinstance(v, list)}
+            document = {name: document[name] for name in ("base_motion", "simulation")} | {"control": control}
+            document["drive"] = {"kind": drive}
+        elif drive in DRIVES and drive != document["drive"]["kind"]:
+            structure = self.structure()
+            shape = schema.schema(structure.mechanism, cast(DriveKind, drive), structure.controller, structure.law)
+            sections = {name: shape.sections[name] for name in ("plant", "control", "initial")}
+            for name, section in (sections | {"drive": shape.kinds["drive"][str(drive)]}).items():
+                document[name] = {k: v for k, v in document[name].items() if k in section.model_fields}
+        for name, other in (*schema.BANDS, *((other, name) for name, other in schema.BANDS)):
+            if f"simulation.{name}" in overrides:
+                document["simulation"].pop(other, None)
+        given = {key.split(".")[1] for key in overrides if key.startswith("initial.")}
+        if overrides.get("initial.on_reference"):
+            document.pop("initial", None)
+        elif given & {"q", "dq", "q_motor"}:
+            document.get("initial", {}).pop("on_reference", None)
+        return document
+
+    def to_toml(self, folder: Path | None = None) -> str:
+        """The complete scenario as TOML; loading it gives an equal one.
+
+        folder  where the text is to stand: paths in it count from there; without it they are absolute
+        """
+        if folder is None:
+            return document_text(self.document)
+        moved = {user.reference: user.reference_from(folder) for user in self.code}
+        return document_text(
+            _with_paths(self.document, lambda path: relative_path(path, folder), lambda name: moved.get(name, name))
+        )
+
+
+def load_scenario(source: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
+    """Load a scenario: a TOML file, or a packaged one by name ("paper/group1_shake").
+
+    overrides  values by dotted key that take the place of the file's; paths in them count from the working directory
+    Raises InputError that names all mistakes at once: file, key, what was expected, the nearest valid name. Raises
+    TypeError for a source that is no path or name, and overrides that are no mapping of texts.
+    """
+    if overrides is None:
+        return _loaded(source, read=True)
+    expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
+    return draft_scenario(source).with_overrides(overrides) if overrides else _loaded(source, read=True)
+
+
+def draft_scenario(source: str | Path) -> Scenario:
+    """A scenario that is going to be changed: its signal files are not read yet, for the change may be to them.
+
+    Raises as `load_scenario` does.
+    """
+    return _loaded(source, read=False)
+
+
+def _loaded(source: str | Path, *, read: bool) -> Scenario:
+    _expect_name(source)
+    name = str(source)
+    text, folder = read_scenario(source)
+    try:
+        document = read_toml(text)
+    except ValueError as error:
+        raise InputError(Problem(name, "", f"is no valid TOML: {error}")) from error
+    expect_kind("scenario", source, document)
+    scenario = Scenario(name, Path(), *resolve(document, name, folder, read=read))
+    if read:
+        scenario.expect_computable(name)
+    return scenario
+
+
+def _expect_name(given: object) -> None:
+    if not isinstance(given, str | PathLike):
+        remedy = ": scenario.with_overrides(...) changes one" if isinstance(given, Scenario) else ""
+        raise TypeError(f"expected the path or name of a scenario, got {shortened(repr(given))}{remedy}")
+
+
+def expect_scenario(given: object) -> None:
+    """Raise TypeError, with the remedy, for what is no Scenario (its name, most likely)."""
+    if not isinstance(given, Scenario):
+        remedy = f": load_scenario({str(given)!r}) gives one" if isinstance(given, str | PathLike) else ""
+        raise TypeError(f"expected a Scenario, got {shortened(repr(given))}{remedy}")
+
+
+def parse_set(text: str, source: str) -> tuple[str, object]:
+    """KEY=TOMLVALUE as a key and a value: "control.delta=0.02", "control.law=power", "plant.m3={ scale = 1.2 }".
+
+    What is no TOML value but a bare word, or a path, is text: quotes inside a shell's quotes are a nuisance.
+    source  the scenario that it is to override, for messages
+    Raises InputError if it is not of that form.
+    """
+    where = _overridden(source)
+    key, equals, value = text.partition("=")
+    key = key.strip()
+    if not equals or not key:
+        raise InputError(Problem(where, "", "expected --set KEY=VALUE", schema.given_text(text)))
+    try:
+        parsed = read_toml(f"value = {value}")
+    except ValueError as error:
+        if isinstance(error, tomllib.TOMLDecodeError) and _BARE_WORD.fullmatch(value.strip()):
+            return key, value.strip()
+        hint = f"expected a TOML value ({error}); a text of several words needs quotes: --set '{key}=\"…\"'"
+        raise InputError(Problem(where, key, hint, value.strip())) from error
+    if set(parsed) != {"value"}:
+        raise InputError(Problem(where, key, "expected one TOML value", schema.given_text(value)))
+    return key, parsed["value"]
+
+
+def _overridden(source: str) -> str:
+    """The place that every mistake in an override is named with: the scenario itself is known to be sound."""
+    return f"override of {source}"
+
+
+@lru_cache(maxsize=64)
+def _system(structure: Structure) -> System:
+    return System(structure)
+
+
+def per_run(slots: Slots, keys: Sequence[str], runs: int) -> Floats:
+    """Some slots of each run, (runs, keys)."""
+    result = np.empty((runs, len(keys)))
+    for column, key in zip(result.T, keys, strict=True):
+        column[:] = slots[key]
+    return result
+
+
+@lru_cache(maxsize=64)
+def _numeric_keys(structure: Structure) -> dict[str, NumericKey]:
+    """The numeric keys of a structure; who asks for every chunk of a sweep gets the same."""
+    system, keys = _system(structure), {}
+    groups: dict[str, list[str]] = {}
+    for slot in system.slots:
+        if slot.key.startswith("initial.") and _is_idle(slot.key, structure):
+            continue
+        unit = schema.unit_text(slot.unit, system.joints)
+        keys[slot.key] = NumericKey(unit, slot.bounds, slot.meaning, (slot.key,))
+        if slot.key.startswith("plant."):
+            scale = scale_key(slot.key)
+            keys[scale] = NumericKey("1", POSITIVE, f"{slot.meaning}, as a factor on the controller's", (scale,))
+    for key in keys:
+        stem, _, last = key.rpartition(".")
+        if last.isdigit():
+            groups.setdefault(stem, []).append(key)
+    for stem, leaves in groups.items():
+        units = " or ".join(dict.fromkeys(keys[leaf].unit for leaf in leaves))
+        first = keys[leaves[0]]
+        meaning = first.meaning.rpartition(" (")[0]
+        keys[stem] = NumericKey(units, first.bounds, f"{meaning} (all joints)", tuple(leaves))
+    return keys
+
+
+def _is_idle(key: str, structure: Structure) -> bool:
+    """Whether an initial value is not read, for the structure says how the run starts."""
+    if structure.start == "reference":
+        return True
+    return key.startswith("initial.q_motor.") and structure.initial_motor != "given"
+
+
+def _with_paths(document: Document, moved: Callable[[str], str], named: Callable[[str], str]) -> Document:
+    """A document whose signal tables name other paths, and whose doors other classes."""
+    result = {
+        name: table | {"path": moved(table["path"])} if "path" in table else table for name, table in document.items()
+    }
+    for table, key in schema.DOORS:
+        result[table] = {**result[table], key: named(result[table][key])}
+    return result
+
+
+def _without_lists(value: object) -> object:
+    """A table without what there is one of for each joint; anything else as it is."""
+    return {k: v for k, v in value.items() if not isinstance(v, list)} if isinstance(value, dict) else value
+
+
+@lru_cache(maxsize=64)
+def _expect_printable(structure: Structure) -> None:
+    """Raise UnprintableOperation, or whatever a user's class raises, for a structure that no kernel can be made of."""
+    lanes.emit(program(structure), {}, 1)
+
+
+def _shape(table: Mapping[str, Any], coordinates: Sequence[str]) -> SignalShape:
+    kind = cast(SignalKind, table["kind"])
+    if kind == "table":
+        return SignalShape(kind, tuple(int(name in table["columns"]) for name in coordinates))
+    if kind == "none":
+        return SignalShape(kind, (0,) * len(coordinates))
+    counted = {"polynomial": "t", "sine": "terms"}[kind]
+    terms = (table[name] for name in coordinates)
+    return SignalShape(kind, tuple(len(t[counted] if isinstance(t, dict) else t) for t in terms))
+
+
+def _first_outside(bounds: Bounds, column: Floats) -> int | None:
+    """Index of the first value that is out of bounds; bounds are an interval, so the extremes tell for all."""
+    if column.size == 0:
+        return None
+    inside = not np.isnan(column).any() and bounds.holds(float(column.min())) and bounds.holds(float(column.max()))
+    if inside and not (bounds.even and np.any(column % 2)):
+        return None
+    return next(i for i, value in enumerate(column) if not bounds.holds(float(value)))

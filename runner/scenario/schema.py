@@ -1,0 +1,493 @@
+"""The shape of a scenario file: which tables and keys there are, and what each may hold.
+
+Names, units, bounds and defaults of everything numeric come from the model's declarations; pydantic checks the tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import Annotated, Any, Literal, cast, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError, create_model
+from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
+
+from springline.codegen.kernel import MOST_STEPS
+from springline.codegen.numbers import double
+from springline.model.base import COORDINATES
+from springline.model.control import CONTROLLERS, LARGEST_SURFACE_EXPONENT, LAWS, LogForm
+from springline.model.drive import DRIVES, EPSILON, DriveKind
+from springline.model.integrators import INTEGRATORS
+from springline.model.mechanisms import MECHANISMS, Mechanism
+from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
+from springline.model.registry import Registry
+from springline.model.structure import Structure
+from springline.model.system import control_parameters, own_control_tables
+from springline.runner.files import Problem, unknown, value_text
+from springline.runner.scenario.splines import ENDS, UNITS
+
+Mode = Literal["continuous", "sampled"]
+Kind = Literal["none", "sine", "polynomial", "table"]
+
+MOTOR_STARTS = ("unloaded", "equilibrium")
+
+_DEFAULT = Structure()
+
+
+def unit_text(unit: str, joints: Sequence[Joint]) -> str:
+    """A unit for people; one that stands for every joint's lists them: "m or rad"."""
+    return " or ".join(dict.fromkeys(unit.format(q=joint.unit, F=joint.force) for joint in joints))
+
+
+def number_text(bounds: Bounds, unit: str) -> str:
+    """What is expected of a number: "a number > 0 [kg]"."""
+    return f"{bounds} [{unit}]" if unit not in ("1", "SI", "") else str(bounds)
+
+
+def _wrong(
+    expected: str, *, at: tuple[str | int, ...] = (), given: object = None, **context: Any
+) -> PydanticCustomError:
+    """The error of a leaf; `at` leads to the value inside it that is wrong, if not the whole."""
+    told = {"expected": expected, "at": at, **context}
+    return PydanticCustomError("expected", "{expected}", told | ({"given": given} if at else {}))
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A pydantic annotation for one value.
+
+    expected  what is expected, for messages
+    check     returns the value in its final form, or raises
+    """
+
+    expected: str
+    check: Callable[[object], Any]
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.check)
+
+
+def number(unit: str = "1", bounds: Bounds = REAL) -> Leaf:
+    """A float within bounds."""
+    expected = number_text(bounds, unit)
+
+    def check(value: object) -> float:
+        try:
+            if bounds.holds(double(value)):
+                return double(value)
+        except (TypeError, ValueError):
+            pass
+        raise _wrong(f"expected {expected}")
+
+    return Leaf(expected, check)
+
+
+def per_joint(numbers: Sequence[Leaf], joints: Sequence[Joint]) -> Leaf:
+    """One number for all joints, or a list with one for each; kept as a list."""
+    kinds = " or ".join(dict.fromkeys(item.expected for item in numbers))
+    names = ", ".join(joint.name for joint in joints)
+    expected = f"{kinds}, for all joints or as a list of {len(joints)} ({names})"
+
+    def check(value: object) -> list[float]:
+        if not isinstance(value, list):
+            return [_checked(item, value, expected) for item in numbers]
+        if len(value) != len(joints):
+            raise _wrong(f"expected {expected}")
+        pairs = enumerate(zip(numbers, value, strict=True))
+        return [_checked(item, entry, item.expected, at=(i,), given=entry) for i, (item, entry) in pairs]
+
+    return Leaf(expected, check)
+
+
+def plant_value(own: Leaf, scale: Leaf) -> Leaf:
+    """A value of the plant's own, or { scale = factor on the controller's }."""
+    expected = f"{own.expected}, or {{ scale = {POSITIVE} }}"
+
+    def check(value: object) -> object:
+        if not isinstance(value, dict):
+            return own.check(value) if isinstance(value, list) else _checked(own, value, expected)
+        for name in value:
+            if name != "scale":
+                raise _wrong("unknown key", at=(str(name),), given=str(name), name=str(name), valid=("scale",))
+        factor = value.get("scale", "")
+        return {"scale": _checked(scale, factor, scale.expected, at=("scale",), given=factor)}
+
+    return Leaf(expected, check)
+
+
+def whole(most: int, *, odd: bool = False) -> Leaf:
+    """A positive integer up to `most`, odd if so asked."""
+    expected = f"a positive {'odd ' * odd}integer up to {most}"
+
+    def check(value: object) -> int:
+        if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= most and (value % 2 or not odd):
+            return value
+        raise _wrong(f"expected {expected}")
+
+    return Leaf(expected, check)
+
+
+def flag() -> Leaf:
+    """A truth value."""
+
+    def check(value: object) -> bool:
+        if isinstance(value, bool):
+            return value
+        raise _wrong("expected true or false")
+
+    return Leaf("true or false", check)
+
+
+def text() -> Leaf:
+    """A text that is not empty."""
+
+    def check(value: object) -> str:
+        if isinstance(value, str) and value:
+            return value
+        raise _wrong("expected a text in quotes")
+
+    return Leaf("a text in quotes", check)
+
+
+def choice(kind: str, names: Iterable[str]) -> Leaf:
+    """One of several names; `kind` says what they name."""
+    names = tuple(names)
+
+    def check(value: object) -> str:
+        if isinstance(value, str) and value in names:
+            return value
+        raise _wrong(f"unknown {kind}", name=value if isinstance(value, str) else "", valid=names)
+
+    return Leaf(" or ".join(f'"{name}"' for name in names), check)
+
+
+def names_file(text: object) -> bool:
+    """Whether a name in a scenario means a class of a user's file: "my_arm.py:MyArm"."""
+    return isinstance(text, str) and (".py:" in text or text.endswith(".py"))
+
+
+def door(kind: str, registry: Registry[Any]) -> Leaf:
+    """One of those that come with springline, or a class of a user's file; `kind` says what they name."""
+    packaged = choice(kind, registry)
+
+    def check(value: object) -> str:
+        return str(value) if names_file(value) else str(packaged.check(value))
+
+    return Leaf(f'{packaged.expected} or "FILE.py:CLASS"', check)
+
+
+def several(item: Leaf) -> Leaf:
+    """A list of at least one."""
+    expected = f"a list, not empty, each {item.expected}"
+
+    def check(value: object) -> list[Any]:
+        if not isinstance(value, list) or not value:
+            raise _wrong(f"expected {expected}")
+        return [_checked(item, entry, item.expected, at=(i,), given=entry) for i, entry in enumerate(value)]
+
+    return Leaf(expected, check)
+
+
+def motor_start(given: Leaf) -> Leaf:
+    """How the springs stand at t = 0, by name or as motor coordinates."""
+    named = choice("start of the motors", MOTOR_STARTS)
+
+    def check(value: object) -> object:
+        return named.check(value) if isinstance(value, str) else given.check(value)
+
+    return Leaf(f"{named.expected} or {given.expected}", check)
+
+
+def _checked(leaf: Leaf, value: object, expected: str, **context: Any) -> Any:
+    """`leaf.check`, with another text for what was expected."""
+    try:
+        return leaf.check(value)
+    except PydanticCustomError as error:
+        raise _wrong(f"expected {expected}", **context) from error
+
+
+class Section(BaseModel):
+    """A table of the file: no other keys than its own."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, protected_namespaces=())
+
+
+_EXPONENT = whole(LARGEST_SURFACE_EXPONENT, odd=True)
+
+
+class ControlStructure(Section):
+    """The keys of [control] that are no numbers of the model."""
+
+    controller: Annotated[str, door("controller", CONTROLLERS)] = _DEFAULT.controller
+    law: Annotated[str, door("law", LAWS)] = _DEFAULT.law
+    log_form: Annotated[str, choice("log_form", get_args(LogForm))] = _DEFAULT.log_form
+    l: Annotated[int, _EXPONENT] = _DEFAULT.exponents.l  # noqa: E741 - the paper's letter
+    m: Annotated[int, _EXPONENT] = _DEFAULT.exponents.m
+    p: Annotated[int, _EXPONENT] = _DEFAULT.exponents.p
+    r: Annotated[int, _EXPONENT] = _DEFAULT.exponents.r
+    fast: Annotated[bool, flag()] = True
+    mode: Annotated[str, choice("mode", get_args(Mode))] = "continuous"
+    period: Annotated[float | None, number("s", POSITIVE)] = None
+
+
+class Simulation(Section):
+    """[simulation]: time, output and thresholds of the metrics (bands: fractions of |e_i(0)|; errors: |e_i|)."""
+
+    duration: Annotated[float, number("s", POSITIVE)] = 4.0
+    step: Annotated[float, number("s", POSITIVE)] = 1e-4
+    integrator: Annotated[str, choice("integrator", INTEGRATORS)] = _DEFAULT.integrator
+    output_every: Annotated[int, whole(MOST_STEPS)] = 10
+    bound: Annotated[float, number("SI", LIMIT)] = 1e6
+    response_band: Annotated[float | None, number("1", UNIT_OPEN)] = None
+    settling_band: Annotated[float | None, number("1", UNIT_OPEN)] = None
+    response_error: Annotated[float | None, number("SI", POSITIVE)] = None
+    settling_error: Annotated[float | None, number("SI", POSITIVE)] = None
+
+
+BANDS = (("response_band", "response_error"), ("settling_band", "settling_error"))
+"""Keys of [simulation] that exclude each other."""
+DEFAULT_BANDS = {"response_band": 0.10, "settling_band": 0.05}
+
+
+class NoMotion(Section):
+    """kind = "none"."""
+
+    kind: Literal["none"]
+
+
+@dataclass(frozen=True)
+class Schema:
+    """The tables of a scenario for one mechanism and kind of drive.
+
+    sections  table -> its keys, for the tables whose keys do not depend on a kind
+    kinds     table -> kind -> its keys, for the others
+    """
+
+    sections: Mapping[str, type[Section]]
+    kinds: Mapping[str, Mapping[str, type[Section]]]
+
+
+TABLES = ("mechanism", "drive", "plant", "control", "reference", "base_motion", "initial", "simulation")
+
+
+DEFAULT_KINDS = {"drive": "elastic", "reference": "sine", "base_motion": "none"}
+"""Table -> the kind that it has where none is given."""
+
+
+DOORS: Mapping[tuple[str, str], tuple[Registry[Any], str]] = {
+    ("mechanism", "name"): (MECHANISMS, _DEFAULT.mechanism),
+    ("control", "controller"): (CONTROLLERS, _DEFAULT.controller),
+    ("control", "law"): (LAWS, _DEFAULT.law),
+}
+"""Table and key that may name a class of a user's file -> what else it may name, and what it is by default."""
+
+
+@lru_cache
+def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, law: str = _DEFAULT.law) -> Schema:
+    """The schema for the mechanism, kind of drive, controller and law that are registered as such.
+
+    Raises ValueError for a controller or law whose table [control.<its name>] would be a key that there is already.
+    """
+    mechanism = MECHANISMS[name]
+    joints = mechanism.joints
+    arm, moving = mechanism.parameters, DRIVES[drive].parameters(mechanism)
+    named = (Annotated[str, door("mechanism", MECHANISMS)], name)
+    shared = _numbers(control_parameters(mechanism, drive), joints)
+    own = own_control_tables(Structure(name, law, drive=drive, controller=controller))
+    for taken in own:
+        if taken in shared or taken in ControlStructure.model_fields:
+            raise ValueError(f"{taken!r} is a key of [control] already: give the class another name")
+    position, rate = (_each("{q}", REAL, joints), _each("{q}/s", REAL, joints))
+    initial = {
+        "q": (Annotated[Any, position], list(mechanism.start_position)),
+        "dq": (Annotated[Any, rate], list(mechanism.start_rate)),
+        "q_motor": (Annotated[Any, motor_start(position)], MOTOR_STARTS[0]),
+        "on_reference": (Annotated[bool, flag()], False),
+    }
+    if drive == "rigid":
+        del initial["q_motor"]
+    coordinates = {c.key: c.unit for c in COORDINATES}
+    sines: dict[str, Any] = {key: (_terms(unit), []) for key, unit in coordinates.items()}
+    return Schema(
+        sections={
+            "mechanism": _section("mechanism", {"name": named, **_numbers(arm, joints)}),
+            "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *moving)}),
+            "control": _section("control", shared | _own_tables(own, joints), ControlStructure),
+            "initial": _section("initial", initial),
+            "simulation": Simulation,
+        },
+        kinds={
+            "drive": {kind: _drive_section(kind, mechanism) for kind in DRIVES},
+            "reference": {
+                "sine": _reference_sines(mechanism),
+                "polynomial": _reference_polynomials(mechanism),
+                "table": _table_section({joint.name: joint.unit for joint in joints}),
+            },
+            "base_motion": {
+                "none": NoMotion,
+                "sine": _section("sine", {"kind": (Literal["sine"], ...), **sines}),
+                "table": _table_section(coordinates),
+            },
+        },
+    )
+
+
+def _own_tables(own: Mapping[str, Iterable[Parameter]], joints: Sequence[Joint]) -> dict[str, Any]:
+    """Fields of the tables [control.<name>]."""
+    sections = {name: _section(name, _numbers(parameters, joints)) for name, parameters in own.items()}
+    return {name: (made, made.model_validate({})) for name, made in sections.items()}
+
+
+def _drive_section(kind: str, mechanism: Mechanism) -> type[Section]:
+    """[drive] of one kind; only springs split the system into a slow and a fast one."""
+    parameters = DRIVES[kind].parameters(mechanism)
+    split = (EPSILON,) if kind == "elastic" else ()
+    return _section("drive", {"kind": (Literal[kind], kind), **_numbers((*parameters, *split), mechanism.joints)})
+
+
+def _section(name: str, fields: Mapping[str, Any], base: type[Section] = Section) -> type[Section]:
+    made: type[Section] = create_model(name, __base__=base, **dict(fields))
+    return made
+
+
+def _each(unit: str, bounds: Bounds, joints: Sequence[Joint]) -> Leaf:
+    return per_joint([number(unit_text(unit, [joint]), bounds) for joint in joints], joints)
+
+
+def _leaf(parameter: Parameter, joints: Sequence[Joint]) -> Leaf:
+    if parameter.per_joint:
+        return _each(parameter.unit, parameter.bounds, joints)
+    return number(unit_text(parameter.unit, joints), parameter.bounds)
+
+
+def _numbers(parameters: Iterable[Parameter], joints: Sequence[Joint]) -> dict[str, Any]:
+    """Fields of declared parameters."""
+
+    def default(item: Parameter) -> float | list[float]:
+        values = item.defaults(joints)
+        return list(values) if item.per_joint else values[0]
+
+    return {item.name: (Annotated[Any, _leaf(item, joints)], default(item)) for item in parameters}
+
+
+def _plant(parameter: Parameter, joints: Sequence[Joint]) -> Any:
+    """Field of a parameter that the plant may have for itself."""
+    scale = _each("1", POSITIVE, joints) if parameter.per_joint else number("1", POSITIVE)
+    return Annotated[Any, plant_value(_leaf(parameter, joints), scale)], None
+
+
+def _terms(unit: str) -> Any:
+    """The type of a list of sine terms."""
+    fields = {
+        "amplitude": (Annotated[float, number(unit)], ...),
+        "omega": (Annotated[float, number("rad/s")], ...),
+        "phase": (Annotated[float, number("rad")], 0.0),
+    }
+    return list[_section("term", fields)]  # type: ignore[misc] # a type made at run time
+
+
+def _reference_sines(mechanism: Mechanism) -> type[Section]:
+    """A joint that is given has offset 0 and no terms unless it says so; one that is not has the mechanism's."""
+    fields: dict[str, Any] = {"kind": (Literal["sine"], "sine")}
+    for i, joint in enumerate(mechanism.joints):
+        offset = (Annotated[float, number(joint.unit)], 0.0)
+        made = _section(joint.name, {"offset": offset, "terms": (_terms(joint.unit), [])})
+        terms = [asdict(item) for item in mechanism.reference_terms[i]]
+        default = made.model_validate({"offset": mechanism.reference_offset[i], "terms": terms})
+        fields[joint.name] = (made, default)
+    return _section("sine", fields)
+
+
+def _reference_polynomials(mechanism: Mechanism) -> type[Section]:
+    """Via points of each joint; one that is not given stands where the mechanism starts."""
+    fields: dict[str, Any] = {"kind": (Literal["polynomial"], ...)}
+    for joint, start in zip(mechanism.joints, mechanism.start_position, strict=True):
+        made = _section(
+            joint.name,
+            {"t": (Annotated[Any, several(number("s"))], ...), "q": (Annotated[Any, several(number(joint.unit))], ...)},
+        )
+        fields[joint.name] = (made, made.model_validate({"t": [0.0], "q": [start]}))
+    return _section("polynomial", fields)
+
+
+def _table_section(units: Mapping[str, str]) -> type[Section]:
+    """A signal from a CSV file: a column for the time and any of the coordinates, whose SI units are `units`."""
+    names = {key: (Annotated[str | None, text()], None) for key in units}
+    columns = _section("columns", {"t": (Annotated[str, text()], ...), **names})
+    known = {key: choice("unit", UNITS.get(si, {si: 1.0})) for key, si in {"t": "s", **units}.items()}
+    in_units = _section("units", {key: (Annotated[str | None, leaf], None) for key, leaf in known.items()})
+    return _section(
+        "table",
+        {
+            "kind": (Literal["table"], ...),
+            "path": (Annotated[str, text()], ...),
+            "columns": (columns, ...),
+            "units": (in_units, Field(default_factory=in_units)),
+            "t0": (Annotated[float, number("s")], 0.0),
+            "ends": (Annotated[str, choice("ends", ENDS)], ENDS[0]),
+        },
+    )
+
+
+def check(
+    section: type[Section], value: Mapping[str, Any], key: str, where: str
+) -> tuple[dict[str, Any], list[Problem]]:
+    """A table in its final form, every default filled in, without the keys that are wrong; and what is wrong with them.
+
+    key    the table's name
+    where  what it came from, for messages
+    """
+    try:
+        return section.model_validate(value).model_dump(exclude_none=True), []
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+    problems = [_problem(section, key, where, item) for item in details]
+    wrong = {str(item["loc"][0]) for item in details}
+    try:
+        kept = section.model_validate({k: v for k, v in value.items() if k not in wrong}).model_dump(exclude_none=True)
+    except ValidationError:  # a key without a default is missing
+        kept = {}
+    return {name: item for name, item in kept.items() if name not in wrong}, problems
+
+
+def _problem(section: type[Section], table: str, where: str, error: ErrorDetails) -> Problem:
+    context = error.get("ctx", {})
+    loc = (*error["loc"], *context.get("at", ()))
+    key = ".".join([table, *map(str, loc)])
+    given = given_text(context.get("given", error["input"]))
+    if error["type"] == "expected":
+        valid, name = context.get("valid", ()), context.get("name", "")
+        return Problem(where, key, context["expected"], given, name, valid)
+    owner = _owner(section, loc)
+    name = str(loc[-1]) if loc else table
+    if error["type"] == "extra_forbidden":
+        return unknown(where, key, "key", name, owner.model_fields)
+    if error["type"] == "missing":
+        leaf = next((item for item in owner.model_fields[name].metadata if isinstance(item, Leaf)), None)
+        what = leaf.expected if leaf else f"a table with {_keys(_owner(section, (*loc, '')))}"
+        return Problem(where, key, f"is missing: expected {what}")
+    inner = _owner(section, (*loc, ""))
+    what = "a list of tables with" if error["type"] == "list_type" else "a table with"
+    return Problem(where, key, f"expected {what} {_keys(inner)}", given)
+
+
+def _owner(section: type[Section], loc: Sequence[str | int]) -> type[Section]:
+    """The section that the last name of `loc` stands in."""
+    for part in loc[:-1]:
+        if isinstance(part, str):  # a number is a place in a list of sections
+            annotation = section.model_fields[part].annotation
+            section = cast(type[Section], next(iter(get_args(annotation)), annotation))
+    return section
+
+
+def _keys(section: type[Section]) -> str:
+    return f"{{ {', '.join(section.model_fields)} }}"
+
+
+def given_text(value: object) -> str:
+    """A value as the user would write it in TOML."""
+    try:
+        return value_text(value)
+    except TypeError:
+        return repr(value)

@@ -1,0 +1,256 @@
+"""What a dataset says: shares of what became of the runs, quantiles of each metric, the worst runs, and figures.
+
+Tables of a million rows are read one column, or one part, at a time, so that memory stays flat.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from pyarrow import compute
+
+from springline.codegen.kernel import CHATTERING, METRICS, STATUS, chatters
+from springline.model.parameters import Joint
+from springline.runner.files import units, value_text
+from springline.runner.sweep import sampling
+from springline.runner.sweep.dataset import Dataset
+from springline.runner.sweep.plan import Chunk, Plan
+from springline.runner.sweep.quantiles import Quantiles
+
+Floats = NDArray[np.float64]
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+WORST = 10
+
+_OUTCOMES = STATUS[:3]
+_CHATTERING = "chattering"
+_SHOWN = 20_000  # rows that figures are drawn from
+
+
+@dataclass(frozen=True, slots=True)
+class Distribution:
+    """A metric over the runs that have it: its QUANTILES, and the share of all runs that do not."""
+
+    quantiles: tuple[float, ...]
+    missing: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What the runs of a dataset have in common, and which are the worst.
+
+    outcomes  per group of the sweep ("all" if there is one only), the number of runs by status; "chattering" counts
+              those of the "ok" runs that chatter
+    metrics   by column
+    worst     rows of the dataset: runs that stopped, the earliest first, then those with the largest steady-state error
+    shown     rows for figures: all, or a random subset of a large dataset
+    """
+
+    runs: int
+    outcomes: dict[str, dict[str, int]]
+    metrics: dict[str, Distribution]
+    units: dict[str, str]
+    worst: list[dict[str, Any]]
+    shown: pa.Table
+
+    @property
+    def stopped(self) -> int:
+        """Runs that diverged or left their bounds."""
+        return sum(group[status] for group in self.outcomes.values() for status in _OUTCOMES if status != "ok")
+
+
+def summarize(plan: Plan, dataset: Dataset, done: Collection[int] | None = None) -> Summary:
+    """The Summary of the parts that are there and whole. Raises ValueError if there are none.
+
+    done  numbers of their chunks, if they are known
+    """
+    chunks = [plan.chunk(number) for number in sorted(dataset.done(plan) if done is None else done)]
+    if not chunks:
+        raise ValueError("no runs to summarize")
+    runs = sum(chunk.runs for chunk in chunks)
+    parts = [dataset.part_name(chunk.number) for chunk in chunks]
+    names = group_names(plan)
+    joints = plan.groups[0].work.system.joints
+    outcomes = {name: dict.fromkeys((*_OUTCOMES, _CHATTERING), 0) for name in names}
+    # Gathered as arrays of their final length: small tables would be many, and each a hole in the memory.
+    rows = sum(np.count_nonzero(_picked(chunk, runs)) for chunk in chunks)
+    gathered = {field.name: np.empty(rows, field.type.to_pandas_dtype()) for field in plan.schema}
+    row = 0
+    for chunk, part in zip(chunks, parts, strict=True):
+        table = dataset.read_part(part)
+        for outcome in _OUTCOMES:
+            outcomes[names[chunk.group.number]][outcome] += int(np.count_nonzero(_ended(table, outcome)))
+        outcomes[names[chunk.group.number]][_CHATTERING] += int(np.count_nonzero(chattering(table, joints)))
+        picked = table.filter(pa.array(_picked(chunk, runs)))
+        for name, column in gathered.items():
+            column[row : row + len(picked)] = picked[name].to_numpy()
+        row += len(picked)
+    shown = pa.table([pa.array(gathered.pop(f.name), f.type, from_pandas=True) for f in plan.schema], plan.schema)
+    metrics = _distributions(dataset, parts, shown, joints)
+    return Summary(runs, outcomes, metrics, units(shown), _worst(dataset, parts, metrics), shown)
+
+
+def _distributions(
+    dataset: Dataset, parts: Sequence[str], sample: pa.Table, joints: Sequence[Joint]
+) -> dict[str, Distribution]:
+    """What is to be said of each metric."""
+    columns = [f"{metric}_{joint.name}" for metric in METRICS for joint in joints]
+    quantiles = {column: Quantiles(QUANTILES, _numbers(sample, column)) for column in columns}
+    runs = 0
+    for part in parts:
+        table = dataset.read_part(part, columns)
+        runs += len(table)
+        for column in columns:
+            quantiles[column].count(_numbers(table, column))
+    for part in parts:
+        table = dataset.read_part(part, columns)
+        for column in columns:
+            quantiles[column].gather(_numbers(table, column))
+    return {column: Distribution(item.values(), 1.0 - item.known / runs) for column, item in quantiles.items()}
+
+
+def _worst(dataset: Dataset, parts: Sequence[str], metrics: Mapping[str, Distribution]) -> list[dict[str, Any]]:
+    """The worst rows of the dataset. Steady-state errors of several joints compare as shares of their medians."""
+    errors = {column: item for column, item in metrics.items() if column.startswith("steady_state_error_")}
+    scales = {column: item.quantiles[QUANTILES.index(0.5)] or 1.0 for column, item in errors.items()}
+    worst: list[tuple[float, int, dict[str, Any]]] = []
+    for part in parts:
+        scored = _scored(dataset.read_part(part), scales)
+        worst = heapq.nlargest(WORST, chain(worst, scored), key=lambda item: item[:2])
+    return [row for _, _, row in worst]
+
+
+def _numbers(table: pa.Table, column: str) -> Floats:
+    """A column of numbers, NaN for null."""
+    return np.asarray(table[column].to_numpy(), dtype=np.float64)
+
+
+def chattering(table: pa.Table, joints: Sequence[Joint]) -> NDArray[np.bool_]:
+    """Which runs chatter, on any joint; a run that stopped does not."""
+    end = _numbers(table, "t_end")
+    columns = [chatters(_numbers(table, f"chatter_{joint.name}"), end) for joint in joints]
+    return np.asarray(np.any(columns, axis=0), dtype=np.bool_)
+
+
+def _ended(table: pa.Table, outcome: str) -> NDArray[np.bool_]:
+    """Which runs ended so."""
+    return np.asarray(compute.equal(table["status"], outcome).to_numpy(), dtype=np.bool_)
+
+
+def _scored(table: pa.Table, scales: Mapping[str, float]) -> Iterator[tuple[float, int, dict[str, Any]]]:
+    """The worst rows of a part: (badness, -run, row). A run that stopped is worse than any that did not."""
+    error = np.zeros(len(table))
+    for column, scale in scales.items():
+        error = np.fmax(error, _numbers(table, column) / scale)
+    end = _numbers(table, "t_end")
+    badness = np.where(_ended(table, "ok"), np.arctan(error), 10.0 + 1.0 / (1.0 + end))
+    for row in np.argsort(-badness, kind="stable")[:WORST]:
+        content = table.slice(int(row), 1).to_pylist()[0]
+        yield float(badness[row]), -int(content["run"]), content
+
+
+def _picked(chunk: Chunk, runs: int) -> NDArray[np.bool_]:
+    """Which runs of a chunk figures show: all, or a random choice that does not depend on how runs are cut."""
+    if runs <= _SHOWN:
+        return np.ones(chunk.runs, dtype=np.bool_)
+    return np.asarray(sampling.random(0, "figures", chunk.first, chunk.runs) < _SHOWN / runs)
+
+
+def group_names(plan: Plan) -> list[str]:
+    """What tells the groups of a sweep apart: "control.fast = false", "all" if there is one only."""
+    if len(plan.groups) == 1:
+        return ["all"]
+    tied = {axis.key for axis in plan.sweep.axes if axis.kind == "tie"}
+    constants = ({key: value for key, value in group.constants.items() if key not in tied} for group in plan.groups)
+    return [", ".join(f"{key.rpartition('.')[2]} = {_short(value)}" for key, value in c.items()) for c in constants]
+
+
+def _short(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:g}"
+    text = str(value)
+    return text if len(text) <= 30 else f"{text[:29]}…"
+
+
+# --- tables ----------------------------------------------------------------------------------------------
+
+Rows = tuple[list[str], list[list[str]]]
+"""Header and rows of a table of texts."""
+
+
+def outcome_rows(summary: Summary) -> Rows:
+    """How many runs of each group ended how."""
+    header = ["group", "runs", "ok", "of these chattering", "diverged", "out of bounds", "stopped early"]
+    rows = []
+    for name, counts in summary.outcomes.items():
+        total = sum(counts[outcome] for outcome in _OUTCOMES)
+        share = (total - counts["ok"]) / total if total else 0.0
+        shown = ("ok", _CHATTERING, *_OUTCOMES[1:])
+        rows.append([name, str(total), *(str(counts[outcome]) for outcome in shown), f"{share:.2%}"])
+    return header, rows
+
+
+def metric_rows(summary: Summary) -> Rows:
+    """Quantiles of every metric, over the runs that have it."""
+    names = {0.0: "least", 0.5: "median", 1.0: "largest"}
+    header = ["metric", "unit", *(names.get(q, f"{q:.0%}") for q in QUANTILES), "none"]
+    rows = [
+        [
+            column,
+            summary.units[column],
+            *("–" if np.isnan(value) else f"{value:.4g}" for value in item.quantiles),
+            f"{item.missing:.2%}",
+        ]
+        for column, item in summary.metrics.items()
+    ]
+    return header, rows
+
+
+def worst_rows(summary: Summary, keys: Sequence[str]) -> Rows:
+    """The worst runs with what varied and what came of it."""
+    results = [name for name in summary.units if name.startswith(("settling_time_", "steady_state_error_"))]
+    header = ["run", "status", "t_end", *keys, *results]
+    return header, [[_cell(row[name]) for name in header] for row in summary.worst]
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.6g}" if isinstance(value, float) else _short(value)
+
+
+def markdown(plan: Plan, summary: Summary, figures: Sequence[str], name: str) -> str:
+    """summary.md: the tables, and the figures by file name."""
+    keys = [axis.key for axis in plan.sweep.axes]
+    varied = "\n".join(f"- `{axis.key}`: `{value_text(axis.as_toml())}`" for axis in plan.sweep.axes)
+    sections = [
+        f"# {name}",
+        f"{summary.runs:,} of {plan.runs:,} runs of `{plan.sweep.scenario.source}` ({plan.sweep.method}, "
+        f"seed {plan.sweep.seed}).\n\n{varied}",
+        "## What became of the runs\n\n"
+        + _markdown_table(outcome_rows(summary))
+        + f"\n\nA run chatters where `chatter_` of a joint is above {CHATTERING:g} 1/s: its command swings so often "
+        "that its other metrics say little.",
+        *(f"![{figure.rpartition('.')[0]}]({figure})" for figure in figures),
+        "## Metrics\n\nQuantiles over the runs that have the metric; the last column is the share that has not.\n\n"
+        + _markdown_table(metric_rows(summary)),
+        "## The worst runs\n\nThose that stopped, the earliest first; then those with the largest steady-state error. "
+        "`springline replay` simulates one of them again with its trajectory.\n\n"
+        + _markdown_table(worst_rows(summary, keys)),
+    ]
+    return "\n\n".join(sections) + "\n"
+
+
+def _markdown_table(table: Rows) -> str:
+    header, rows = table
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
