@@ -41,17 +41,21 @@ _MOVES = 1e-12  # a base coordinate that stays below this stands still
 
 
 def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
-    """The overview of one run, by name: tracking, error, force, sliding, springs; base_motion if the base moves. If the
-    run came to its end also steady_state, and error_over_base and error_against_base if the base follows a record.
+    """The overview of one run, by name: tracking, error, force; sliding if there is a sliding variable, springs if
+    there are springs, base_motion if the base moves. If the run came to its end also steady_state, and error_over_base
+    and error_against_base if the base follows a record.
     """
     run = _Run(scenario, result)
     figures: dict[str, Callable[[_Run], Figure]] = {
         "tracking": _tracking,
         "error": _error,
         "force": _lines("force", U),
-        "sliding": _lines("sliding", SIGMA),
-        "springs": _lines("spring", Q2, less=Q1),
     }
+    shown = scenario.system().columns
+    if SIGMA in shown:
+        figures["sliding"] = _lines("sliding", SIGMA)
+    if Q2 in shown:
+        figures["springs"] = _lines("spring", Q2, less=Q1)
     if run.moving:
         figures["base_motion"] = _base_motion
     if run.status == "ok":

@@ -169,12 +169,11 @@ def names_file(text: object) -> bool:
 
 def door(kind: str, registry: Registry[Any]) -> Leaf:
     """One of those that come with springline, or a class of a user's file; `kind` says what they name."""
-    packaged = choice(kind, registry)
 
     def check(value: object) -> str:
-        return str(value) if names_file(value) else str(packaged.check(value))
+        return str(value) if names_file(value) else str(choice(kind, registry).check(value))
 
-    return Leaf(f'{packaged.expected} or "FILE.py:CLASS"', check)
+    return Leaf(f'{choice(kind, registry).expected} or "FILE.py:CLASS"', check)
 
 
 def several(item: Leaf) -> Leaf:

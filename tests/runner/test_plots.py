@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from springline.model.control.controller import ArmModel, Control, Controller
+from springline.model.control.registry import CONTROLLERS
+from springline.model.parameters import Values
 from springline.runner.report.style import draw, envelope, figure_files, house_style, label, legend_above, panels
 from springline.runner.run.figures import run_figures
 from springline.runner.run.simulation import Result, simulate
@@ -39,6 +42,19 @@ def diverged() -> Run:
 
 def test_figures_of_a_run(at_rest: Run) -> None:
     assert set(run_figures(*at_rest)) == ALWAYS | {"steady_state"}
+
+
+def test_what_a_run_does_not_have_has_no_figure(monkeypatch: pytest.MonkeyPatch) -> None:
+    rigid = simulated("paper/nominal", simulation__duration=0.1, drive__kind="rigid")
+    assert set(run_figures(*rigid)) == ALWAYS - {"springs"} | {"steady_state"}
+
+    class Proportional(Controller):
+        def control(self, r: Values, y: Values, z: Values, model: ArmModel, p: Values) -> Control:
+            return Control(1e3 * (r.q - y.q1) - 1e2 * y.dq1, r.q - y.q1)
+
+    monkeypatch.setitem(CONTROLLERS, "proportional", Proportional())
+    run = simulated("paper/nominal", simulation__duration=0.1, control__controller="proportional")
+    assert set(run_figures(*run)) == ALWAYS - {"sliding"} | {"steady_state"}
 
 
 def test_a_recorded_base_motion_is_set_against_the_error(at_sea: Run) -> None:

@@ -26,11 +26,10 @@ from springline.runner.sweep.work import parcel
 LAW = """
 import casadi as ca
 from helper import smooth
-from springline.model.parameters import POSITIVE, Parameter
-from springline.model.control.sliding import Law
+from springline.model import Law, Parameter
 
 class Smooth(Law):
-    parameters = (Parameter("gain", "1/s", 30.0, "slope", POSITIVE),)
+    parameters = (Parameter("gain", "1/s", 30.0, "slope"),)
 
     def rate(self, sigma, p):
         return -p.gain * smooth(sigma) - p.k1 * sigma
@@ -38,8 +37,7 @@ class Smooth(Law):
 HELPER = "import casadi as ca\n\ndef smooth(s):\n    return s / ca.sqrt(1 + s**2)\n"
 ARM = """
 import casadi as ca
-from springline.model.mechanisms.mechanism import Mechanism
-from springline.model.parameters import Joint, Parameter
+from springline.model import Joint, Mechanism, Parameter
 
 class Boom(Mechanism):
     joints = (Joint("luff", "rad", "N m"), Joint("telescope", "m", "N"), Joint("hook", "m", "N"))
@@ -64,8 +62,7 @@ class Boom(Mechanism):
         return sum(m * ca.dot(gravity, r) for m, r in self.places(q, p))
 """
 CONTROLLER = """
-from springline.model.control.controller import Control, Controller
-from springline.model.parameters import Parameter
+from springline.model import Control, Controller, Parameter
 
 class Servo(Controller):
     parameters = (Parameter("bandwidth", "1/s", 20.0, "of the error", per_joint=True),)
@@ -335,9 +332,7 @@ def test_a_law_that_varies_is_found_again(folder: Path) -> None:
 
 
 HEAD = (
-    "import casadi as ca\nfrom springline.model.control.sliding import Law\nfrom springline.model.control.controller import Control, "
-    "Controller\nfrom springline.model.mechanisms.mechanism import Mechanism\nfrom springline.model.parameters import Joint, "
-    "Parameter\n"
+    "import casadi as ca\nfrom springline.model import Control, Controller, Joint, Law, Mechanism, Parameter\n\n\n\n\n"
 )
 OF_ARM = (
     "class Bad(Mechanism):\n  joints = (Joint('a', 'm', 'N'),)\n  parameters = (Parameter('m', 'kg', 1.0, 'mass'), "

@@ -32,7 +32,7 @@ def list_(
     what: Annotated[What, typer.Argument(help="Which list.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
-    """List mechanisms, controllers, laws, parameters, packaged scenarios or sweeps."""
+    """List mechanisms, controllers, laws, scenarios and the like."""
     rows = {
         "mechanisms": mechanisms,
         "controllers": controllers,
