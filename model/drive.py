@@ -22,6 +22,7 @@ from springline.model.parameters import Bounds, Parameter, Values
 from springline.model.perturbation import slow_mass
 from springline.model.quantities import DQ1, DQ2, Q1, Q2, Quantity
 from springline.model.symbolic import over, solve_spd
+from springline.model.terms import named, section
 
 DriveKind = Literal["elastic", "rigid"]
 
@@ -77,9 +78,13 @@ class Elastic:
     def plant(self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values) -> ca.SX:
         """dx/dt (4n x 1), equation (1)."""
         q1, dq1, q2, dq2 = ca.vertsplit(x, x.numel() // 4)
-        z = spring_force(q1, q2, diagonal(mechanism.stiffness, p))
-        motors = over(u - z, diagonal(mechanism.motor_inertia, p))
-        return ca.vertcat(dq1, solve_spd(link.mass, z - link.bias), dq2, motors)
+        with section("springs and motors", "(1)"):
+            z = named("z", spring_force(q1, q2, diagonal(mechanism.stiffness, p)))
+            motors = named("ddq2", over(u - z, diagonal(mechanism.motor_inertia, p)))
+        with section("arm on its moving base", "(1)"):
+            named("M1", link.mass), named("C_dq1_G_S", link.bias)
+            joints = named("ddq1", solve_spd(link.mass, z - link.bias))
+        return ca.vertcat(dq1, joints, dq2, motors)
 
     def energy(self, x: ca.SX, mechanism: Mechanism, p: Values) -> ca.SX:
         """Kinetic energy of the motors and what the springs hold, J."""
@@ -101,8 +106,10 @@ class Rigid:
     def plant(self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values) -> ca.SX:
         """dx/dt (2n x 1): equation (4) with U in place of its slow part."""
         _, dq1 = ca.vertsplit(x, x.numel() // 2)
-        mass = slow_mass(link.mass, diagonal(mechanism.motor_inertia, p))
-        return ca.vertcat(dq1, solve_spd(mass, u - link.bias))
+        with section("arm on its moving base, motors on its joints", "(4)"):
+            mass = named("H", slow_mass(link.mass, diagonal(mechanism.motor_inertia, p)))
+            joints = named("ddq1", solve_spd(mass, u - named("C_dq1_G_S", link.bias)))
+        return ca.vertcat(dq1, joints)
 
     def energy(self, x: ca.SX, mechanism: Mechanism, p: Values) -> ca.SX:
         """Kinetic energy of the motors, J."""

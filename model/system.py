@@ -61,6 +61,7 @@ from springline.model.quantities import (
 from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
 from springline.model.symbolic import as_written
+from springline.model.terms import Term, noted
 
 
 def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tuple[Parameter, ...]:
@@ -136,6 +137,7 @@ class System:
         self.z = ca.SX.sym("z", len(self.memory))
         self.h = ca.SX.sym("h")
         self._expect_different_names()
+        self._terms: dict[str, tuple[Term, ...]] = {}
 
     def _expect_different_names(self) -> None:
         """Raise ValueError where two numbers would have one name in C and in tables."""
@@ -248,15 +250,27 @@ class System:
         real = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
         signals = self._commanded
         applied = actuated(self.structure.effects, self.u)
-        dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant)
+        with noted() as terms:
+            dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant)
+        self._terms["plant"] = tuple(terms)
         return {
             **self._equations(real, signals, dx),
             **self._loop(real, signals, dx),
         }
 
+    def terms(self, name: str) -> tuple[Term, ...]:
+        """What the model calls the parts of Function `name`; they are the outputs of Function `name`_terms."""
+        return self._terms.get(name, ()) if self.functions else ()
+
     @cached_property
     def _commanded(self) -> ControlSignals:
         """What the controller computes of q1, dq1 and the rest of the state as they are."""
+        with noted() as terms:
+            signals = self._signals_of_control()
+        self._terms["control"] = tuple(terms)
+        return signals
+
+    def _signals_of_control(self) -> ControlSignals:
         nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal)
         return commanded(
             self.controller,
@@ -321,6 +335,14 @@ class System:
             names,
             ["u", *part_names, "e", *sigma_names],
         )
+        for name, given, given_names in (
+            ("control", ins, names),
+            ("plant", [*base_in, x, self.u], [*base_names, "x", "u"]),
+        ):
+            found = self._terms[name]
+            if found:
+                outputs, labels = [term.value for term in found], [f"term{k}" for k in range(len(found))]
+                result |= function(f"{name}_terms", given, outputs, given_names, labels)
         if self.controller.states:
             result |= {
                 **function("rates", ins, [seen.dz], names, ["dz"]),

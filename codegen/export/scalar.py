@@ -7,7 +7,7 @@ lists, which keeps few values alive at a time: on a small processor that is what
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
@@ -15,8 +15,20 @@ from typing import Any, cast
 import casadi as ca
 
 from springline.codegen.export.bound import Export, port_entries
-from springline.codegen.program import MASKS, POWERS, Binding, Real, ValueGraph, literal, print_operation
+from springline.codegen.program import (
+    MASKS,
+    POWERS,
+    SPECIAL_POWERS,
+    Binding,
+    Node,
+    Real,
+    ValueGraph,
+    formula,
+    literal,
+    print_operation,
+)
 from springline.model.control import LARGEST_EXPONENT, TINY
+from springline.model.parameters import Slot
 
 # Guards among the model's constants that a float cannot hold, and what does their duty there: 1e-24**(-4/3), the
 # steepest power on the control's way, and exp(85) times a gain of 20 are still finite.
@@ -46,14 +58,43 @@ class _Values(ValueGraph):
         self._single = export.real == "float"
         self.tunable = tuple(slot.key for slot in export.tunable_slots)
         column = {slot: k for k, slot in enumerate(export.tunable)}
+        self.constants: dict[int, tuple[str, str]] = {}
+        """Constants that come from parameters, by node: what each is called, "" where it comes from several, and what
+        it is: unit and meaning, or a formula."""
         self._known = {
             "p": [
-                self.leaf("p", column[i], Binding.RUN, varies=True) if i in column else self.constant(value)
-                for i, value in enumerate(export.values)
+                self.leaf("p", column[i], Binding.RUN, varies=True) if i in column else self._baked(slot, value)
+                for i, (slot, value) in enumerate(zip(export.slots, export.values, strict=True))
             ],
         }
         if not export.tables:
             self._known["d"] = [self.constant(0.0)] * export.system.d.numel()
+
+    def _baked(self, slot: Slot, value: float) -> int:
+        """The constant of a parameter: one of its own, whatever else is equal to it."""
+        node = self._intern(("baked", slot.key), Node(None, (), Binding.CONSTANT, value=value, source=("baked", 0)))
+        self.constants[node] = slot.symbol, f"{slot.unit}; {slot.meaning}"
+        return node
+
+    def _folded(self, op: int, arguments: tuple[int, ...], value: float) -> int:
+        if not any(i in self.constants for i in arguments):
+            return super()._folded(op, arguments, value)
+        node = self._intern(
+            ("folded", op, arguments), Node(None, (), Binding.CONSTANT, value=value, source=("folded", 0))
+        )
+        self.constants.setdefault(node, ("", _formula(op, [self._text(i) for i in arguments])))
+        return node
+
+    def _text(self, i: int) -> str:
+        """A constant in the formula of another."""
+        name, text = self.constants.get(i, (f"{self.nodes[i].value:g}", ""))
+        return name or (text if text.replace("_", "").isalnum() else f"({text})")
+
+    def _operation(self, op: int, arguments: tuple[int, ...], origin: str) -> int:
+        exponent = self.nodes[arguments[1]] if op in POWERS else None
+        if exponent is not None and exponent.binding is Binding.CONSTANT and exponent.value in SPECIAL_POWERS:
+            arguments = arguments[0], self.constant(exponent.value)  # one function, wherever its exponent comes from
+        return super()._operation(op, arguments, origin)
 
     def apply(self, function: ca.Function, **given: list[int]) -> list[int]:
         """Add a Function; the nodes of all its outputs' entries. Inputs not given are leaves of their own names."""
@@ -65,6 +106,26 @@ class _Values(ValueGraph):
         ]
         printed = cast(ca.Function, _SinglePrecision(function)) if self._single else function
         return [i for output in self.add(function.name(), printed, inputs) for i in output]
+
+
+_SIGNS = {ca.OP_ADD: " + ", ca.OP_SUB: " - ", ca.OP_MUL: " ", ca.OP_DIV: " / "}
+
+
+def _formula(op: int, texts: Sequence[str]) -> str:
+    """An operation on constants, for a comment."""
+    if op in _SIGNS:
+        return _SIGNS[op].join(texts)
+    if op == ca.OP_SQ:
+        return f"{texts[0]}^2"
+    return f"-{texts[0]}" if op == ca.OP_NEG else formula(op, texts)
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of a function for its reader: what it is, and the nodes that it computes, by what they are called."""
+
+    title: str
+    names: tuple[tuple[int, str], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +165,26 @@ class ScalarPrinter:
             function.name(): [label for port in export.outputs(function) for label in port.labels]
             for function in functions
         }
+        self._sections = {
+            function.name(): self._explained(function.name())
+            for function in functions
+            if export.system.terms(function.name())
+        }
         self._name_inputs()
+
+    def _explained(self, name: str) -> list[Section]:
+        """The parts of Function `name` that the model has words for, in its order."""
+        system = self._export.system
+        nodes = iter(self._graph.apply(system.function(f"{name}_terms")))
+        joints = tuple(joint.name for joint in system.joints)
+        found: dict[tuple[str, str], list[tuple[int, str]]] = {}
+        for term in system.terms(name):
+            found.setdefault(term.section, []).extend((next(nodes), label) for label in term.labels(joints))
+        return [
+            Section(f"{title}, {equations}" if equations else title, tuple(names))
+            for (title, equations), names in found.items()
+            if title
+        ]
 
     def _name_inputs(self) -> None:
         entries = port_entries(self._export.system)
@@ -165,7 +245,7 @@ class ScalarPrinter:
             taken = [k for k, target in enumerate(targets) if target]
             wanted, labels = [wanted[k] for k in taken], [labels[k] for k in taken]
             targets = [targets[k] for k in taken]
-        return self._body(wanted, self._needed(wanted), load, targets, labels)
+        return self._body(wanted, self._needed(wanted), load, targets, labels, sections=self._sections.get(name, ()))
 
     def derive(self, load: Callable[[str, int], str], target: str) -> Body:
         """What `functions` expect under target[0], target[1], …"""
@@ -200,11 +280,16 @@ class ScalarPrinter:
         labels: Sequence[str],
         *,
         deriving: bool = False,
+        sections: Sequence[Section] = (),
     ) -> Body:
         nodes = self._graph.nodes
         lines: list[str] = []
         ready: set[int] = set()
-        names = self._named(wanted, needed, labels)
+        places = self._parts(needed, sections)
+        needed = sorted(needed, key=lambda i: places[i])  # stable: within a part the order of the frozen lists
+        names = self._named(wanted, needed, labels, sections)
+        constants: dict[int, str] = {}
+        part = -1
         pairs = {(nodes[i].op, nodes[i].arguments[0]): i for i in needed if nodes[i].op in (ca.OP_SIN, ca.OP_COS)}
 
         def given(i: int) -> str:
@@ -214,7 +299,10 @@ class ScalarPrinter:
         def value(i: int) -> str:
             node = nodes[i]
             if node.binding is Binding.CONSTANT:
-                return literal(node.value, self._real)
+                if i not in self._graph.constants:
+                    return literal(node.value, self._real)
+                unnamed = sum(not self._graph.constants[k][0] for k in constants)
+                return constants.setdefault(i, self._graph.constants[i][0] or f"c{unnamed}")
             if i not in ready:
                 ready.add(i)
                 if given(i) != names[i]:
@@ -229,6 +317,9 @@ class ScalarPrinter:
             node = nodes[i]
             if i in ready:
                 continue
+            if sections and places[i] != part:
+                part = places[i]
+                lines += ["", f"/* {sections[part].title} */"] if part < len(sections) else [""]
             if node.op in (ca.OP_SIN, ca.OP_COS) and len({(op, a) for op, a in pairs if a == node.arguments[0]}) == 2:
                 sine, cosine = pairs[ca.OP_SIN, node.arguments[0]], pairs[ca.OP_COS, node.arguments[0]]
                 argument = value(node.arguments[0])
@@ -242,15 +333,43 @@ class ScalarPrinter:
             ready.add(i)
         # What is only handed on needs no name.
         values = [given(i) if self._is_input(i) and i not in ready else value(i) for i in wanted]
+        lines += [""] if sections else []
         lines += [f"{target} = {text};" for target, text in zip(targets, values[: len(targets)], strict=True)]
+        lines = [*self._constant_lines(constants), *lines]
         return Body(tuple(lines), tuple(values), len(needed), self._live(wanted, needed))
 
-    def _named(self, wanted: Sequence[int], needed: Sequence[int], labels: Sequence[str]) -> dict[int, str]:
+    def _constant_lines(self, used: Mapping[int, str]) -> list[str]:
+        """Definitions of the constants that come from parameters, each with what it is; parameters first."""
+        nodes = sorted(used, key=lambda i: (not self._graph.constants[i][0], i if self._graph.constants[i][0] else 0))
+        values = [literal(self._graph.nodes[i].value, self._real) for i in nodes]
+        texts = [f"const {self._real} {used[i]} = {value};" for i, value in zip(nodes, values, strict=True)]
+        width = max(map(len, texts), default=0)
+        return [f"{text:{width}} /* {self._graph.constants[i][1]} */" for text, i in zip(texts, nodes, strict=True)]
+
+    def _parts(self, needed: Sequence[int], sections: Sequence[Section]) -> dict[int, int]:
+        """In which section each node is computed: in the first that needs it; what none needs comes last."""
+        places = dict.fromkeys(needed, len(sections))
+        for part, section in enumerate(sections):
+            stack = [i for i, _ in section.names]
+            while stack:
+                i = stack.pop()
+                if places.get(i) == len(sections):
+                    places[i] = part
+                    stack.extend(self._graph.nodes[i].arguments)
+        return places
+
+    def _named(
+        self, wanted: Sequence[int], needed: Sequence[int], labels: Sequence[str], sections: Sequence[Section]
+    ) -> dict[int, str]:
         """What each value is called: by the model where it has a word for it, else a0, a1, … in order."""
         nodes = self._graph.nodes
         names = dict(self._names) | {i: f"r{k}" for i, k in self._derived.items()}
         for i, label in zip(wanted, labels, strict=True):
             names.setdefault(i, label)
+        taken = {*names.values(), *(name for name, _ in self._graph.constants.values() if name)}
+        for i, label in (pair for section in sections for pair in section.names):
+            if label not in taken and names.setdefault(i, label) == label:
+                taken.add(label)
         for position, i in enumerate(needed):
             if nodes[i].op in (ca.OP_SIN, ca.OP_COS) and nodes[i].arguments[0] in self._names:
                 function = "sin" if nodes[i].op == ca.OP_SIN else "cos"

@@ -97,11 +97,15 @@ class ValueGraph:
             self.nodes.append(node)
         return self._index[key]
 
+    def _folded(self, op: int, arguments: tuple[int, ...], value: float) -> int:
+        """The node of what an exact operation on constants gives."""
+        return self.constant(value)
+
     def _operation(self, op: int, arguments: tuple[int, ...], origin: str) -> int:
         nodes = [self.nodes[i] for i in arguments]
         if op in _EXACT and all(node.binding is Binding.CONSTANT for node in nodes):
             try:
-                return self.constant(_EXACT[op](*(node.value for node in nodes)))
+                return self._folded(op, arguments, _EXACT[op](*(node.value for node in nodes)))
             except (ZeroDivisionError, ValueError):
                 pass  # 1/0, sqrt(-1): left to C, which knows Inf and NaN
         if op in _NO_LIMIT and nodes[1].binding is Binding.CONSTANT and nodes[1].value == _NO_LIMIT[op]:

@@ -28,6 +28,7 @@ from springline.model.lagrange import EquationsOfMotion
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.perturbation import slow_mass
 from springline.model.quantities import SIGMA, U_WISHED, Quantity
+from springline.model.terms import named, section
 
 States = Mapping[str, ca.SX]
 Rates = States | Callable[[ca.SX], States]
@@ -175,7 +176,7 @@ def commanded(
             raise ValueError(f"controller {controller.name}: {text}")
         return ca.SX(value)
 
-    def named(what: str, values: Mapping[str, ca.SX], wanted: Sequence[Quantity]) -> dict[str, ca.SX]:
+    def by_name(what: str, values: Mapping[str, ca.SX], wanted: Sequence[Quantity]) -> dict[str, ca.SX]:
         unknown = [name for name in values if name not in {item.name for item in wanted}]
         if unknown:
             known = ", ".join(item.name for item in wanted) or "nothing"
@@ -187,7 +188,7 @@ def commanded(
         }
 
     def stacked(what: str, rates: Rates) -> ca.SX:
-        found = named(what, rates(command) if callable(rates) else rates, controller.states)
+        found = by_name(what, rates(command) if callable(rates) else rates, controller.states)
         for state in controller.states:
             if state.name not in found:
                 size = len(state.entries(joints))
@@ -199,7 +200,7 @@ def commanded(
     if controller.law and given.a_law is None:
         raise ValueError(f"controller {controller.name}: Control has no a_law, expected what its law asks for")
     a_law = ca.SX.zeros(n) if given.a_law is None else column("a_law", given.a_law, n)
-    shown = named("diagnostics", given.diagnostics, controller.diagnostics)
+    shown = by_name("diagnostics", given.diagnostics, controller.diagnostics)
     if SIGMA in controller.diagnostics and SIGMA.name not in shown:
         raise ValueError(f"controller {controller.name}: diagnostics has no 'sigma', which the class declares")
     parts = {item: shown[item.name] for item in controller.diagnostics if item != SIGMA and item.name in shown}
@@ -207,7 +208,8 @@ def commanded(
     if not ca.is_equal(ca.densify(reduce(add, parts.values())), ca.densify(wished), 100):
         names = " + ".join(item.name for item in parts)
         raise ValueError(f"controller {controller.name}: u is not {names}, the parts that diagnostics has")
-    command = ca.fmin(ca.fmax(wished, -p.U_max), p.U_max)
+    with section("command, limited per motor", "(13), E4"):
+        command = named("u", ca.fmin(ca.fmax(named("u_wished", wished), -p.U_max), p.U_max))
     dz = stacked("dz", given.dz)
     later = controller.update(r, y, states, model, p, h)
     ahead = z + h * dz if later is None else stacked("update", later)

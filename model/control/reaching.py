@@ -16,6 +16,7 @@ from springline.model.declared import column, expect_names, expect_parameters, e
 from springline.model.parameters import EVEN, LIMIT, POSITIVE, UNIT_OPEN, Bounds, Parameter, Values
 from springline.model.registry import Registry
 from springline.model.symbolic import over
+from springline.model.terms import named, of_joint
 
 LogForm = Literal["power", "base"]
 
@@ -42,11 +43,13 @@ class Law(ABC):
     name        in scenario files and of the generated function: the class's name in snake_case unless the class says
                 otherwise
     title       for people: the name unless the class says otherwise
+    equations   where it is written, "(20)" in docs/paper.md for the packaged ones; "" where there is nothing to cite
     parameters  what it reads: of a packaged law from the [control] table, of another from [control.<its name>]
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
+    equations: ClassVar[str] = ""
     parameters: ClassVar[tuple[Parameter, ...]] = ()
 
     def __init_subclass__(cls) -> None:
@@ -69,6 +72,7 @@ class VariablePowerLog(Law):
 
     name = "variable_power_log"
     title = "variable power log"
+    equations = "(18), (19), E8"
     parameters = (K1, K2, K3, ALPHA, EPSILON_LOG, NU, ZETA)
 
     log_form: LogForm = "power"
@@ -79,14 +83,15 @@ class VariablePowerLog(Law):
 
     def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
         """Wished d sigma / dt of a scalar sigma."""
-        size = ca.fmax(ca.fabs(sigma), TINY)
-        exponent = p.zeta * ca.fmax(size, 1.0) * ca.log(size)
-        power = ca.exp(ca.fmin(exponent, LARGEST_EXPONENT))
-        log = ca.fmax(ca.log1p(p.epsilon_log * size**p.nu), TINY)
+        size = named("size", ca.fmax(ca.fabs(sigma), TINY))
+        exponent = named("exponent", p.zeta * ca.fmax(size, 1.0) * ca.log(size))
+        power = named("f", ca.exp(ca.fmin(exponent, LARGEST_EXPONENT)))
+        log = named("L", ca.fmax(ca.log1p(p.epsilon_log * size**p.nu), TINY))
         if self.log_form == "power":
             fast, slow = log * log**p.alpha, log ** (1 - p.alpha)
         else:
             fast, slow = over(log, ca.log1p(p.alpha)), over(log, -ca.log1p(-p.alpha))
+        named("L_far", fast), named("L_near", slow)
         return -(p.k1 * power + p.k2 * fast + p.k3 * slow) * ca.sign(sigma)
 
 
@@ -95,11 +100,12 @@ class DoublePower(Law):
 
     name = "double_power"
     title = "double power"
+    equations = "(21)"
     parameters = (K1, K2, ALPHA, BETA)
 
     def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
         """Wished d sigma / dt of a scalar sigma."""
-        size = ca.fmax(ca.fabs(sigma), TINY)
+        size = named("size", ca.fmax(ca.fabs(sigma), TINY))
         return -(p.k1 * size**p.alpha + p.k2 * size**p.beta) * ca.sign(sigma)
 
 
@@ -108,11 +114,12 @@ class Power(Law):
 
     name = "power"
     title = "power"
+    equations = "(20)"
     parameters = (K1, ALPHA)
 
     def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
         """Wished d sigma / dt of a scalar sigma."""
-        size = ca.fmax(ca.fabs(sigma), TINY)
+        size = named("size", ca.fmax(ca.fabs(sigma), TINY))
         return -(p.k1 * size**p.alpha) * ca.sign(sigma)
 
 
@@ -134,7 +141,9 @@ def reaching_rate(law: Law, sigma: ca.SX, p: Values) -> tuple[ca.SX, ca.SX]:
 
     Raises ValueError for a law whose rate is no scalar of what it was given.
     """
-    joints = ca.vertsplit(sigma)
-    given = list(p.values())
-    wished = ca.vertcat(*(column(f"law {law.name}", "rate", law.rate(s, p), 1, [s, *given]) for s in joints))
-    return ca.fmin(ca.fmax(wished, -p.a_max), p.a_max), wished
+    rates, given = [], list(p.values())
+    for i, s in enumerate(ca.vertsplit(sigma)):
+        with of_joint(i):
+            rates.append(column(f"law {law.name}", "rate", law.rate(s, p), 1, [s, *given]))
+    wished = named("a_law", ca.vertcat(*rates))
+    return named("a", ca.fmin(ca.fmax(wished, -p.a_max), p.a_max)), wished

@@ -8,6 +8,7 @@ from fractions import Fraction
 import casadi as ca
 
 from springline.model.parameters import NON_NEGATIVE, POSITIVE, Parameter, Values
+from springline.model.terms import named, of_joint
 
 # Guards arguments of roots and logarithms at zero: far below any signal, and h**(-5/2) of it, the steepest power
 # in the derivatives of the surface's slope, is still finite.
@@ -55,7 +56,7 @@ def odd_power(e: ca.SX, exponent: Fraction) -> tuple[ca.SX, ca.SX]:
 def terminal_term(e: ca.SX, delta: ca.SX, exponent: Fraction) -> tuple[ca.SX, ca.SX]:
     """phi(e) = e h^((n-1)/2) with h = e^2 + delta^2, and phi'(e) = h^((n-3)/2) (n e^2 + delta^2), 0 < n < 1 (E3)."""
     e2, d2 = e**2, delta**2
-    h = ca.fmax(e2 + d2, TINY)
+    h = named("h", ca.fmax(e2 + d2, TINY))
     root = h ** float((exponent - 1) / 2)
     # h^((n-3)/2) is a whole power of h^((n-1)/2) for the usual n (4 for 1/3): products instead of a second power.
     ratio = (exponent - 3) / (exponent - 1)
@@ -81,8 +82,11 @@ def surface(e: ca.SX, de: ca.SX, p: Values, exponents: SurfaceExponents) -> tupl
     """
     sigma, slope = [], []
     for i in range(e.numel()):
-        strong, strong_slope = odd_power(e[i], Fraction(exponents.l, exponents.m))
-        weak, weak_slope = terminal_term(e[i], p.delta, Fraction(exponents.p, exponents.r))
+        with of_joint(i):
+            strong, strong_slope = odd_power(e[i], Fraction(exponents.l, exponents.m))
+            weak, weak_slope = terminal_term(e[i], p.delta, Fraction(exponents.p, exponents.r))
+            named("power_term", strong), named("terminal_term", weak)
+            named("power_slope", strong_slope), named("terminal_slope", weak_slope)
         sigma.append(de[i] + p.mu[i] * strong + p["lambda"] * weak)
         slope.append(de[i] * (p.mu[i] * strong_slope + p["lambda"] * weak_slope))
     return ca.vertcat(*sigma), ca.vertcat(*slope)

@@ -191,13 +191,21 @@ class TypedInterface:
         ahead = [f"ahead->{field.name}" for field in self.structures.get("memory", ())]
         asked = self.bodies["control"].values[-system.n :] if system.controller.law else []
         flags = [
-            f"  diagnostics->saturated_{j.name} = command->U_{j.name} < {total} || command->U_{j.name} > {total};"
-            for j, total in zip(system.joints, sums, strict=True)
+            f"  diagnostics->saturated_{j.name} = "
+            + (
+                "0;"
+                if self._is_unlimited(f"control.U_max.{k}")
+                else f"command->U_{j.name} < {total} ||\n      command->U_{j.name} > {total};"
+            )
+            for k, (j, total) in enumerate(zip(system.joints, sums, strict=True))
         ]
         for k, a_law in enumerate(asked):
             limit = self._parameter(f"control.a_max.{k}")
             name = system.joints[k].name
-            flags.append(f"  diagnostics->a_limited_{name} = {a_law} < -{limit} || {a_law} > {limit};")
+            told = f"{a_law} < -{limit} || {a_law} > {limit}"
+            flags.append(
+                f"  diagnostics->a_limited_{name} = {0 if self._is_unlimited(f'control.a_max.{k}') else told};"
+            )
         flags.append(f"  return {_all(f'springline_is_finite({a_law})' for a_law in asked) or '1'};")
         state = self.structures["state"]
         blocks |= {
@@ -332,7 +340,12 @@ class TypedInterface:
         return [f"  double d[{self.export.system.d.numel()}];", f"  sl_table_data({tables}, {time}, d, 1);"]
 
     def _lines(self, name: str) -> list[str]:
-        return [f"  {line}" for line in self.bodies[name].lines]
+        return [f"  {line}".rstrip() for line in self.bodies[name].lines]
+
+    def _is_unlimited(self, key: str) -> bool:
+        """Whether a limit is a constant, and none."""
+        k = [slot.key for slot in self.export.slots].index(key)
+        return k not in self.export.tunable and math.isinf(self.export.values[k])
 
     def _parameter(self, key: str) -> str:
         """C of a parameter's value inside a function that is given the controller."""
