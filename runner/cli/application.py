@@ -14,7 +14,7 @@ import sys
 import traceback
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import typer
 from typer.core import TyperGroup
@@ -119,11 +119,20 @@ def main() -> None:
             code = end.code
         sys.stdout.flush()
     except OSError as error:  # a full disk, or nobody reads any more
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for Python tries again at its end
+        _close(sys.stdout)
         if not code and not isinstance(error, BrokenPipeError):
             complain(f"Error: cannot write to the standard output: {error}")
         code = code or 1
+    try:
+        sys.stderr.flush()
+    except OSError:
+        _close(sys.stderr)
     sys.exit(code)
+
+
+def _close(stream: TextIO) -> None:
+    """Let what a stream holds go nowhere: Python tries again at its end, and would make an exit code of it."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _expect_working_directory() -> None:

@@ -539,8 +539,9 @@ def test_streams_that_are_closed_or_full(command: list[str], shell: str, code: i
 
 
 @pytest.mark.parametrize("shell", ["2>/dev/full", "2>&-"])
-def test_wrong_input_has_its_code_though_nobody_can_be_told(shell: str) -> None:
-    assert in_a_process("run", "nowhere", shell=shell).returncode == 2
+@pytest.mark.parametrize("unbuffered", [None, "1"])
+def test_wrong_input_has_its_code_though_nobody_can_be_told(shell: str, unbuffered: str | None) -> None:
+    assert in_a_process("run", "nowhere", shell=shell, PYTHONUNBUFFERED=unbuffered).returncode == 2
 
 
 def test_a_fault_of_springline_is_one_line_and_its_traceback_can_be_had(monkeypatch: pytest.MonkeyPatch) -> None:
