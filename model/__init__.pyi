@@ -12,3 +12,5 @@ from .quantities import Quantity as Quantity
 from .signals import SineTerm as SineTerm
 from .structure import Structure as Structure
 from .system import System as System
+from .terms import named as named
+from .terms import section as section

@@ -1,0 +1,146 @@
+"""Exported C reads as the law does: sections, the model's names, parameters by theirs; nothing is computed otherwise."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+
+import casadi as ca
+import pytest
+
+from springline.codegen.export import bind
+from springline.codegen.export.c.tree import generate_files
+from springline.model import Law, Parameter, Structure, System
+from springline.model.control import reaching
+from springline.model.parameters import Values
+from springline.model.terms import Term, named, noted, of_joint, section
+from springline.runner.scenario import load_scenario
+
+SECTIONS = [
+    "tracking error and sliding variable, (22), E3",
+    "reaching law: variable power log, (18), (19), E8, limit E4",
+    "slow control: computed torque, (14), (25)",
+    "fast control, (33)",
+    "command, limited per motor, (13), E4",
+    "springs and motors, (1)",
+    "arm on its moving base, (1)",
+]
+
+
+@cache
+def source(scenario: str = "paper/nominal", **changes: object) -> str:
+    loaded = load_scenario(scenario, {key.replace("__", "."): value for key, value in changes.items()})
+    files, _ = generate_files(bind(loaded.structure(), loaded.values()))
+    return files["src/springline.c"].decode()
+
+
+def constants(text: str) -> Iterator[tuple[str, float, str]]:
+    """Name, value and comment of each constant."""
+    for name, value, comment in re.findall(r"^  const double (\w+) = (\S+); +/\* (.*) \*/$", text, re.MULTILINE):
+        yield name, float(value), comment
+
+
+def test_the_parts_stand_in_order_under_the_numbers_of_the_equations() -> None:
+    found = re.findall(r"^  /\* (.*) \*/$", source(), re.MULTILINE)
+    assert [text for text in found if not text.startswith("stage")] == SECTIONS
+
+
+@pytest.mark.parametrize(
+    ("name", "statement"),
+    [
+        ("e", "q1d_{j} - q1_{j}"),
+        ("de", "dq1d_{j} - dq1_{j}"),
+        ("exponent", r"a\d+ \* a\d+"),
+        ("f", r"sl_exp\(a\d+\)"),
+        ("L_far", r"L_{j} \* \w+"),
+        ("a", r"sl_fmin\(a\d+, control_a_max_{j}\)"),
+        ("u_e", "a_{j} - dsurface_{j}"),
+        ("ddq", "ddq1d_{j} - u_e_{j}"),
+        ("u_f", r"control_K_f_{j} \* a\d+"),
+        ("u", r"u_s_{j} \+ u_f_{j}"),
+    ],
+)
+@pytest.mark.parametrize("joint", ["lift", "rotation"])
+def test_values_are_called_as_in_the_model(name: str, statement: str, joint: str) -> None:
+    wanted = rf"^  const double {name}_{joint} = {statement.replace('{j}', joint)};$"
+    assert re.search(wanted, source(), re.MULTILINE), wanted
+
+
+def test_baked_parameters_are_called_by_their_names_and_have_their_values() -> None:
+    scenario = load_scenario("paper/nominal")
+    values = {slot.symbol: value for slot, value in zip(scenario.system().slots, scenario.values(), strict=True)}
+    found = [item for item in constants(source()) if not re.fullmatch(r"c\d+", item[0])]
+    assert {"control_k1", "control_lambda", "control_a_max_rotation", "plant_k_s2"} <= {name for name, _, _ in found}
+    for name, value, _ in found:
+        assert value == values[name]
+
+
+def test_what_comes_from_several_says_how_to_the_last_bit() -> None:
+    scenario = load_scenario("paper/nominal")
+    values = {slot.symbol: value for slot, value in zip(scenario.system().slots, scenario.values(), strict=True)}
+    found = [item for item in constants(source()) if re.fullmatch(r"c\d+", item[0])]
+    assert len(found) > 10
+    for _, value, formula in found:
+        python = re.sub(r"(?<=[\w)]) (?=[\w(])", " * ", formula).replace("^", "**")
+        assert eval(python, {}, values) == value, formula  # noqa: S307 - our own text
+
+
+@pytest.mark.parametrize("drive", ["elastic", "rigid"])
+def test_names_change_no_operation(monkeypatch: pytest.MonkeyPatch, drive: str) -> None:
+    structure = Structure(drive=drive)  # type: ignore[arg-type] # parametrized
+    with_names = System(structure).functions
+
+    @contextmanager
+    def deaf() -> Iterator[list[Term]]:
+        yield []
+
+    monkeypatch.setattr("springline.model.system.noted", deaf)
+    without = System(structure).functions
+    assert {name for name in with_names if name not in without} == {"control_terms", "plant_terms"}
+    for name, function in without.items():
+        assert function.serialize() == with_names[name].serialize()
+
+
+def test_no_limit_is_no_operation_and_no_flag() -> None:
+    text = source(control__a_max=float("inf"))
+    assert "SL_INF" not in text
+    assert text.count("diagnostics->a_limited_lift = 0;") == 1
+    assert "control_a_max" not in text
+
+
+def test_an_own_law_is_named_as_its_class_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Soft(Law):
+        title = "soft sign"
+        equations = "(7) of somebody"
+        parameters = (Parameter("width", "SI", 0.5, "of the soft middle"),)
+
+        def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
+            root = named("root", ca.sqrt(sigma**2 + p.width**2))
+            return -30 * sigma / root
+
+    monkeypatch.setitem(reaching.LAWS, "soft", Soft())
+    system = System(Structure(law="soft"))
+    files, _ = generate_files(bind(Structure(law="soft"), [slot.default or 1.0 for slot in system.slots]))
+    text = files["src/springline.c"].decode()
+    assert "/* reaching law: soft sign, (7) of somebody, limit E4 */" in text
+    assert re.search(r"const double root_rotation = sl_sqrt\(a\d+\);", text)
+
+
+def test_a_name_has_to_be_one_in_c() -> None:
+    x = ca.SX.sym("x")
+    assert named("no name", x) is x, "nobody listens"
+    with noted(), pytest.raises(ValueError, match="'no name'"):
+        named("no name", x)
+
+
+def test_what_is_noted() -> None:
+    x = ca.SX.sym("x", 2)
+    with noted() as terms, section("part", "(1)"):
+        named("x", x)
+        with of_joint(1):
+            named("half", x[1] / 2)
+        named("outer", x @ x.T)
+    labels = [label for term in terms for label in term.labels(("a", "b"))]
+    assert labels == ["x_a", "x_b", "half_b", "outer_a_a", "outer_b_a", "outer_a_b", "outer_b_b"]
+    assert {term.section for term in terms} == {("part", "(1)")}
+    assert named("x", x) is x
