@@ -251,8 +251,8 @@ def test_wrong_builds_are_refused_or_found_out(
     shutil.copytree(folder, broken)
     source = broken / "src" / f"{prefix}.c"
     text = source.read_text()
-    assert text.count("29.6 *") >= 1
-    source.write_text(text.replace("29.6 *", f"{math.nextafter(29.6, 30.0)!r} *"))
+    assert text.count("= 29.6;") >= 1
+    source.write_text(text.replace("= 29.6;", f"= {math.nextafter(29.6, 30.0)!r};"))
     program = compile_c(
         gcc, sources(broken, prefix, "self_check.c"), tmp_path / "check", "-std=c99", "-ffp-contract=off"
     )

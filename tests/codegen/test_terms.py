@@ -1,4 +1,4 @@
-"""Exported C reads as the law does: sections, the model's names, parameters by theirs; nothing is computed otherwise."""
+"""Exported C reads as the law does: sections, the model's names, parameters by theirs; nothing else is computed."""
 
 import re
 from collections.abc import Iterator
