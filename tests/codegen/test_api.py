@@ -149,8 +149,8 @@ def test_a_changed_parameter_changes_its_reads_and_no_other_code(nominal: tuple[
     typed = differing_lines(old["src/springline.c"], new["src/springline.c"])
     assert len(typed) == 2  # where the constant is given its name
     assert {re.sub(r"\ba\d+\b", "a", line) for line in typed} == {
-        "-  const double a = 3.0 * a;",
-        "+  const double a = 3.25 * a;",
+        "-  const double control_k1 = 3.0;               /* SI; gain of the reaching law's first term */",
+        "+  const double control_k1 = 3.25;              /* SI; gain of the reaching law's first term */",
     }
     assert [line[:20] for line in differing_lines(old["README.md"], new["README.md"])] == [
         "-| `control.k1` | 3.0 |"[:20],
