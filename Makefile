@@ -13,10 +13,10 @@ PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-bui
 SHIPPED = $(shell find springline model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format docs-tables math-accuracy firmware bench clean FORCE
+.PHONY: help install reproduce test test-full lint format docs-tables docs-pictures math-accuracy firmware bench clean FORCE
 
 help: ## list the verbs
-	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-12s %s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-13s %s\n", $$1, $$2 }'
 
 install: .venv/installed ## springline and all development tools in .venv, editable
 
@@ -41,6 +41,9 @@ format: .venv/installed ## let ruff put the code in order
 
 docs-tables: .venv/installed ## print the tables of columns and metrics in docs/scenarios.md anew
 	$(BIN)/python -m runner.report.docs_tables --write
+
+docs-pictures: .venv/installed ## draw the picture of docs/architecture.md anew, from the imports
+	$(BIN)/python -m runner.report.architecture
 
 math-accuracy: .venv/installed ## measure the elementary functions against mpmath; writes the table in docs/math.md
 	$(BIN)/python -m benchmarks.math_accuracy --write

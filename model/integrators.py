@@ -136,4 +136,5 @@ DOP853 = Tableau(
     ),
 )
 
-INTEGRATORS: dict[str, Tableau] = {tableau.name: tableau for tableau in (EULER, MIDPOINT, RK4, DOPRI5, DOP853)}
+_ALL = (EULER, MIDPOINT, RK4, DOPRI5, DOP853)
+INTEGRATORS: dict[str, Tableau] = {tableau.name: tableau for tableau in _ALL}

@@ -7,6 +7,7 @@ Commands within the text are checked against the options that the command line h
 from __future__ import annotations
 
 import math
+import os
 import re
 import shlex
 import shutil
@@ -29,7 +30,9 @@ from springline.runner.scenario.locate import kind_of
 from springline.runner.sweep import sweep as sweeps
 
 ROOT = Path(__file__).parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "examples/README.md"]
+OTHERS = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "examples/README.md")]
+PAGES = [*OTHERS, *sorted((ROOT / "docs").glob("*.md"))]
+HOUSE = ROOT / "docs/architecture.md"  # changes springline itself, and so has a test of its own
 PROGRAMS = ("springline", "make", "pip", "python", "fmpy")
 STEPS = 100  # of every documented run
 
@@ -196,7 +199,7 @@ def run_c(block: Block) -> None:
 RUNNERS: dict[str, Callable[[Block], None]] = {"sh": run_shell, "python": run_python, "toml": run_toml, "c": run_c}
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if any(blocks(page))], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [page for page in PAGES if page != HOUSE and any(blocks(page))], ids=lambda page: page.name)
 @pytest.mark.usefixtures("place")
 def test_every_block_of_a_page_works(page: Path) -> None:
     for block in blocks(page):
@@ -209,6 +212,90 @@ def test_what_is_run_elsewhere_is_documented() -> None:
         line for page in PAGES for block in blocks(page) if block.language == "sh" for line in commands(block.text)
     }
     assert set(ELSEWHERE) <= shown
+
+
+# --- how-tos that change springline itself ---------------------------------------------------------------
+
+
+def headings(page: Path) -> list[tuple[int, str]]:
+    """Line and text of the headings of a page, code aside."""
+    code = {k for block in blocks(page) for k in range(block.line, block.line + block.text.count("\n") + 2)}
+    lines = enumerate(page.read_text(encoding="utf-8").splitlines(), start=1)
+    return [(k, line.lstrip("# ")) for k, line in lines if line.startswith("#") and k not in code]
+
+
+def sections(page: Path) -> dict[str, list[Block]]:
+    """The blocks of a page by the heading that they stand under."""
+    found: dict[str, list[Block]] = {}
+    for block in blocks(page):
+        found.setdefault([text for line, text in headings(page) if line < block.line][-1], []).append(block)
+    return found
+
+
+def changed(content: str, changes: str) -> str:
+    """A file after the changes of a block: each hunk must fit at one place."""
+    for hunk in changes.split("\n@@\n"):
+        lines = hunk.splitlines()
+        assert all(line[:1] in {" ", "+", "-"} for line in lines), hunk
+        old, new = ("\n".join(["", *(line[1:] for line in lines if line[0] in kept), ""]) for kept in (" -", " +"))
+        assert content.count(old) == 1, f"fits at {content.count(old)} places: {hunk}"
+        content = content.replace(old, new)
+    return content
+
+
+def run_in(copy: Path, work: Path, block: Block) -> None:
+    """Do what a block of HOUSE shows: change or write a file of the copy, run commands or a script beside it."""
+    first, _, rest = block.text.partition("\n")
+    file = first.removeprefix("# ")
+    if block.language == "diff":
+        path = copy / file
+        path.write_text(changed(path.read_text("utf-8"), rest), encoding="utf-8")
+        return
+    if re.fullmatch(r"# [\w./]+/[\w.]+", first):
+        path = copy / file
+        assert not path.exists(), f"{block}: {file} is there"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(rest, encoding="utf-8")
+        return
+    assert block.language in {"sh", "python"}, f"{block}: no way to run this here"
+    main = "import sys; from springline.runner.cli import main; sys.argv[1:] = {!r}; main()"
+    scripts = [block.text]
+    if block.language == "sh":
+        called = [shlex.split(line) for line in commands(block.text)]
+        assert all(program == "springline" for program, *_ in called), str(block)
+        scripts = [main.format(arguments) for _, *arguments in called]
+    for script in scripts:
+        done = subprocess.run(
+            [sys.executable, "-c", f"import springline\nassert {str(copy)!r} in springline.__file__\n{script}"],
+            cwd=work,
+            env={**os.environ, "PYTHONPATH": str(copy.parent)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{block}: {done.stdout}{done.stderr}"
+
+
+@pytest.mark.parametrize("heading", sections(HOUSE))
+def test_every_how_to_works_in_a_copy_of_springline(heading: str, tmp_path: Path) -> None:
+    copy, work = tmp_path / "springline", tmp_path / "work"
+    work.mkdir()
+    shutil.copytree(ROOT / "springline", copy, ignore=shutil.ignore_patterns("__pycache__"))
+    for package in ("model", "codegen", "runner", "benchmarks", "generated"):
+        shutil.copytree(ROOT / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", copy)
+    for block in sections(HOUSE)[heading]:
+        run_in(copy, work, block)
+
+
+def test_the_files_that_the_pages_for_contributors_name_are_there() -> None:
+    named = [
+        name
+        for page in (HOUSE, ROOT / "CONTRIBUTING.md", ROOT / "codegen/export/README.md")
+        for name in re.findall(r"`((?:model|codegen|runner|benchmarks|tests|docs)/[\w/.]*)`", page.read_text("utf-8"))
+    ]
+    assert len(named) > 30
+    assert not [name for name in named if not (ROOT / name).exists()]
 
 
 # --- commands within the text ----------------------------------------------------------------------------

@@ -7,5 +7,7 @@ from .bound import operations as operations
 from .bound import port_entries as port_entries
 from .bound import provenance as provenance
 from .names import check_files as check_files
+from .registry import target_files as target_files
+from .registry import targets as targets
 from .scalar import Body as Body
 from .scalar import ScalarPrinter as ScalarPrinter

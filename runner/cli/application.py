@@ -19,9 +19,10 @@ from typing import Annotated, Any, TextIO
 import typer
 from typer.core import TyperGroup
 
+from springline.codegen.export import targets
 from springline.codegen.files import FolderConflict
 from springline.codegen.kernel import ToolchainError
-from springline.runner.cli.commands import batch, doctor, fmu, generate, listing, reproduce, run
+from springline.runner.cli.commands import batch, doctor, fmu, generate, listing, reproduce, run, target
 from springline.runner.cli.terminal import complain, say
 from springline.runner.files import InputError
 
@@ -81,6 +82,8 @@ app.command("generate")(generate.generate)
 export.command("c")(generate.export_c)
 export.command("fmu2")(fmu.export_fmu2)
 export.command("fmu3")(fmu.export_fmu3)
+for name, description in targets().items():
+    export.command(name)(target.target_command(name, description))
 app.add_typer(export, name="export")
 app.command("reproduce")(reproduce.reproduce)
 for entry in sorted(entry_points(group="springline.commands"), key=lambda entry: entry.name):
