@@ -25,6 +25,10 @@
 extern "C" {
 #endif
 
+/* What made this, and of what: SHA-256 of model, parameters and options. */
+#define SPRINGLINE_VERSION "0.1.0"
+#define SPRINGLINE_MODEL_HASH "4303d7017957cc1e34b1fdf5f6da83d15721b657932d70bcdd047e1d753256b3"
+
 typedef double springline_real;
 
 /* What every function returns; springline_status_text says what to do about it. */

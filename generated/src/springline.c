@@ -32,6 +32,9 @@ static const springline_command springline_no_command = {0.0, 0.0};
 static const springline_diagnostics springline_no_diagnostics = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0, 0};
 static const springline_base springline_base_at_rest = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
 
+/* A compile-time error where a controller takes more than the 32 bytes that springline.h says. */
+typedef char springline_controller_has_its_size[sizeof(springline_controller) <= 32u ? 1 : -1];
+
 static int springline_is_finite(springline_real x) { return sl_isfinite(x); }
 
 /* ---- the model, printed from the frozen expressions ------------------------------------------------------- */

@@ -60,7 +60,8 @@ def changed(key: str, value: float) -> np.ndarray:
 def differing_lines(old: bytes, new: bytes) -> list[str]:
     """Removed and added lines, without those that carry the hash."""
     lines = difflib.unified_diff(old.decode().splitlines(), new.decode().splitlines(), lineterm="", n=0)
-    return [line for line in lines if line[0] in "+-" and line[:3] not in ("+++", "---") and "SHA-256" not in line]
+    changed = (line for line in lines if line[0] in "+-" and line[:3] not in ("+++", "---"))
+    return [line for line in changed if "SHA-256" not in line and "_MODEL_HASH " not in line]
 
 
 def digest(files: dict[str, bytes], manifest: dict) -> str:
@@ -128,6 +129,31 @@ def test_manifest(nominal: tuple[dict[str, bytes], dict]) -> None:
         assert function["operations"] > 0
         for port in function["inputs"] + function["outputs"]:
             assert len(port["unit"]) == port["shape"][0] * port["shape"][1]
+
+
+def test_what_made_it_and_of_what_can_be_asked_in_c(nominal: tuple[dict[str, bytes], dict]) -> None:
+    files, manifest = nominal
+    header = files["include/springline.h"].decode()
+    assert f'#define SPRINGLINE_VERSION "{manifest["springline"]}"\n' in header
+    assert f'#define SPRINGLINE_MODEL_HASH "{manifest["hash"]}"\n' in header
+
+
+def test_a_controller_larger_than_promised_does_not_compile(
+    nominal: tuple[dict[str, bytes], dict], tmp_path: Path
+) -> None:
+    for path, content in nominal[0].items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_bytes(content)
+    source = tmp_path / "src/springline.c"
+    text = source.read_text()
+    (size,) = re.findall(r"sizeof\(springline_controller\) <= (\d+)u", text)
+    flags = ["-std=c99", "-fsyntax-only", f"-I{tmp_path / 'include'}", f"-I{tmp_path / 'src'}"]
+    for promised, expected in ((int(size), 0), (int(size) - 1, 1)):
+        source.write_text(text.replace(f"<= {size}u", f"<= {promised}u"))
+        command = [*toolchain.find_compiler().argv, *flags, str(source)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert bool(done.returncode) == bool(expected), done.stderr
+        assert ("springline_controller_has_its_size" in done.stderr) == bool(expected)
 
 
 # --- changes ---------------------------------------------------------------------------------------------

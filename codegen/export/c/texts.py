@@ -31,6 +31,7 @@ def text_files(export: Export, interface: TypedInterface) -> dict[str, bytes]:
         "math": "slf" if single else "sl",
         "math_header": "sl_mathf.h" if single else "sl_math.h",
         "version": version("springline"),
+        "model_hash": export.sha256,
         **interface.blocks(),
     }
     banner = comment(start)

@@ -14,6 +14,9 @@ static const springline_command springline_no_command = {{zero_command}};
 static const springline_diagnostics springline_no_diagnostics = {{zero_diagnostics}};
 static const springline_base springline_base_at_rest = {{zero_base}};
 {{initial_memory}}
+/* A compile-time error where a controller takes more than the {{controller_bytes}} bytes that springline.h says. */
+typedef char springline_controller_has_its_size[sizeof(springline_controller) <= {{controller_bytes}}u ? 1 : -1];
+
 static int springline_is_finite(springline_real x) { return {{math}}_isfinite(x); }
 
 /* ---- the model, printed from the frozen expressions ------------------------------------------------------- */

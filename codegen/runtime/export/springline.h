@@ -7,6 +7,10 @@
 extern "C" {
 #endif
 
+/* What made this, and of what: SHA-256 of model, parameters and options. */
+#define SPRINGLINE_VERSION "{{version}}"
+#define SPRINGLINE_MODEL_HASH "{{model_hash}}"
+
 typedef {{real}} springline_real;
 
 /* What every function returns; springline_status_text says what to do about it. */
