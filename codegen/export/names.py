@@ -15,7 +15,7 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-_KEYWORDS = _words("""
+KEYWORDS = _words("""
     alignas alignof and and_eq asm atomic_cancel atomic_commit atomic_noexcept auto bitand bitor bool break case catch
     char char8_t char16_t char32_t class co_await co_return co_yield compl concept const const_cast consteval constexpr
     constinit continue contract_assert decltype default delete do double dynamic_cast else enum explicit export extern
@@ -25,6 +25,7 @@ _KEYWORDS = _words("""
     throw true try typedef typeid typename typeof typeof_unqual union unsigned using virtual void volatile wchar_t while
     xor xor_eq
 """)
+"""Of C and C++, in small letters."""
 
 # Of C, C++, POSIX, and what a compiler brings along (the elementary functions include one of these).
 _HEADERS = _words("""
@@ -81,7 +82,7 @@ def check_prefix(prefix: str) -> None:
             f"prefix {prefix!r} would make names with two _ in a row, which C++ keeps: one _ inside is fine"
         )
     reasons = (
-        (lower in _KEYWORDS, "is a keyword of C or C++"),
+        (lower in KEYWORDS, "is a keyword of C or C++"),
         (lower in _HEADERS, f"would make a {lower}.h, which takes the place of a header that others include"),
         (lower in _LIBRARIES, f"would make a lib{lower}, which takes the place of a library that others link"),
         (lower in _DEVICES, "is the name of a device on Windows: no file can have it"),

@@ -7,6 +7,7 @@ lists, which keeps few values alive at a time: on a small processor that is what
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +16,7 @@ from typing import Any, cast
 import casadi as ca
 
 from springline.codegen.export.bound import Export, port_entries
+from springline.codegen.export.names import KEYWORDS
 from springline.codegen.program import (
     MASKS,
     POWERS,
@@ -118,6 +120,19 @@ def _formula(op: int, texts: Sequence[str]) -> str:
     if op == ca.OP_SQ:
         return f"{texts[0]}^2"
     return f"-{texts[0]}" if op == ca.OP_NEG else formula(op, texts)
+
+
+# What the printed functions call their own: numbered values, sines and cosines, what they are given, their mathematics.
+_OWN = re.compile(r"[acr]\d+|sin_\w+|cos_\w+|slf?_\w+")
+_GIVEN = frozenset({
+    *("controller", "reference", "measurement", "command", "diagnostics", "base", "state", "config", "parameters"),
+    *("derived", "ahead", "motion", "step", "next", "x", "dx", "u", "z", "dz", "d", "t", "p"),
+})  # fmt: skip
+
+
+def _is_taken(label: str) -> bool:
+    """Whether a name of the model's would be another one's in C; the value then has a number, as if it had no name."""
+    return label in _GIVEN or label in KEYWORDS or _OWN.fullmatch(label) is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -368,7 +383,7 @@ class ScalarPrinter:
             names.setdefault(i, label)
         taken = {*names.values(), *(name for name, _ in self._graph.constants.values() if name)}
         for i, label in (pair for section in sections for pair in section.names):
-            if label not in taken and names.setdefault(i, label) == label:
+            if label not in taken and not _is_taken(label) and names.setdefault(i, label) == label:
                 taken.add(label)
         for position, i in enumerate(needed):
             if nodes[i].op in (ca.OP_SIN, ca.OP_COS) and nodes[i].arguments[0] in self._names:

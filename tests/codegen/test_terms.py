@@ -1,15 +1,18 @@
 """Exported C reads as the law does: sections, the model's names, parameters by theirs; nothing else is computed."""
 
 import re
+import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 
 import casadi as ca
 import pytest
 
 from springline.codegen.export import bind
 from springline.codegen.export.c.tree import generate_files
+from springline.codegen.kernel import toolchain
 from springline.model import Law, Parameter, Structure, System
 from springline.model.control import reaching
 from springline.model.parameters import Values
@@ -119,11 +122,41 @@ def test_an_own_law_is_named_as_its_class_says(monkeypatch: pytest.MonkeyPatch) 
             return -30 * sigma / root
 
     monkeypatch.setitem(reaching.LAWS, "soft", Soft())
-    system = System(Structure(law="soft"))
-    files, _ = generate_files(bind(Structure(law="soft"), [slot.default or 1.0 for slot in system.slots]))
+    files, _ = generate_files(bind(*of_law("soft")))
     text = files["src/springline.c"].decode()
     assert "/* reaching law: soft sign, (7) of somebody, limit E4 */" in text
     assert re.search(r"const double root_rotation = sl_sqrt\(a\d+\);", text)
+
+
+@pytest.mark.parametrize(
+    "name", ["c1", "a5", "r0", "command", "x", "double", "class", "sin_q1", "sl_exp", "derived", "u"]
+)
+def test_a_name_that_is_another_s_gives_way(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str) -> None:
+    """As a scalar of the arm, and as one of each joint: the C compiles, and the value has a number."""
+
+    class Colliding(Law):
+        def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
+            return -30 * named(name, ca.tanh(sigma) / (1 + sigma**2))
+
+    monkeypatch.setitem(reaching.LAWS, "colliding", Colliding())
+    monkeypatch.setattr(Term, "labels", lambda term, joints: [term.name] * term.value.numel())
+    files, _ = generate_files(bind(*of_law("colliding")))
+    for path, content in files.items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_bytes(content)
+    flags = ["-std=c99", "-Werror", "-fsyntax-only", f"-I{tmp_path / 'include'}", f"-I{tmp_path / 'src'}"]
+    command = [*toolchain.find_compiler().argv, *flags, str(tmp_path / "src/springline.c")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    told = re.findall(rf"const double {name} = (.*);", files["src/springline.c"].decode())
+    assert len(told) <= 2, "once in each function, where it is the number of another value"
+    assert not any("tanh" in text for text in told)
+
+
+def of_law(law: str) -> tuple[Structure, list[float]]:
+    """A structure with a law, and numbers for it."""
+    structure = Structure(law=law)
+    return structure, [slot.default or 1.0 for slot in System(structure).slots]
 
 
 def test_a_name_has_to_be_one_in_c() -> None:
