@@ -199,7 +199,9 @@ def run_c(block: Block) -> None:
 RUNNERS: dict[str, Callable[[Block], None]] = {"sh": run_shell, "python": run_python, "toml": run_toml, "c": run_c}
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if page != HOUSE and any(blocks(page))], ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page != HOUSE and any(blocks(page))], ids=lambda page: page.name
+)
 @pytest.mark.usefixtures("place")
 def test_every_block_of_a_page_works(page: Path) -> None:
     for block in blocks(page):

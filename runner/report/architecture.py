@@ -159,7 +159,7 @@ def _package(axes: Axes, root: Path, package: str, graph: Graph, top: float) -> 
             places[room] = (0.22 + _STEP * k, top - 0.38 - _HEIGHT / 2 - _ROW * (row + shift))
             _room(axes, places[room], room.removeprefix(f"{package}.").replace(".", "/") + "/", idea(root, room))
     for room, others in reduced(graph).items():
-        for other in others if room in places else ():
+        for other in sorted(others) if room in places else ():
             (x, y), (end, at) = places[room], places[other]
             if x - end > 1.5 * _STEP:  # around what stands between them
                 _arrow(axes, (x + _WIDTH / 2, y - _HEIGHT / 2), (end + _WIDTH, at), 1.0, way="angle,angleA=90,angleB=0")
