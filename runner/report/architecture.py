@@ -123,8 +123,14 @@ def picture(root: Path = ROOT) -> Figure:
             height = _package(axes, root, package, graph, top)
             middles.append((top, top - height))
             top -= height + 0.34
-        for (_, bottom), (below, _) in itertools.pairwise(middles):
-            _arrow(axes, (0.55, bottom), (0.55, below), 2.0, "imports" if bottom == middles[0][1] else "")
+        pairs = {
+            (module.split(".")[0], other.split(".")[0]) for module, all_ in modules(root).items() for other in all_
+        }
+        for pair, ((_, bottom), (below, _)) in zip(
+            itertools.pairwise(PACKAGES), itertools.pairwise(middles), strict=True
+        ):
+            if pair in pairs:
+                _arrow(axes, (0.55, bottom), (0.55, below), 2.0, "imports" if bottom == middles[0][1] else "")
         axes.set(xlim=(-0.02, 9.82), ylim=(top + 0.24, 0.1), aspect="equal")
         figure.set_size_inches(10.0, 0.1 - (top + 0.24))
         return figure
