@@ -123,8 +123,14 @@ def picture(root: Path = ROOT) -> Figure:
             height = _package(axes, root, package, graph, top)
             middles.append((top, top - height))
             top -= height + 0.34
-        for (_, bottom), (below, _) in itertools.pairwise(middles):
-            _arrow(axes, (0.55, bottom), (0.55, below), 2.0, "imports" if bottom == middles[0][1] else "")
+        pairs = {
+            (module.split(".")[0], other.split(".")[0]) for module, all_ in modules(root).items() for other in all_
+        }
+        for pair, ((_, bottom), (below, _)) in zip(
+            itertools.pairwise(PACKAGES), itertools.pairwise(middles), strict=True
+        ):
+            if pair in pairs:
+                _arrow(axes, (0.55, bottom), (0.55, below), 2.0, "imports" if bottom == middles[0][1] else "")
         axes.set(xlim=(-0.02, 9.82), ylim=(top + 0.24, 0.1), aspect="equal")
         figure.set_size_inches(10.0, 0.1 - (top + 0.24))
         return figure
@@ -159,7 +165,7 @@ def _package(axes: Axes, root: Path, package: str, graph: Graph, top: float) -> 
             places[room] = (0.22 + _STEP * k, top - 0.38 - _HEIGHT / 2 - _ROW * (row + shift))
             _room(axes, places[room], room.removeprefix(f"{package}.").replace(".", "/") + "/", idea(root, room))
     for room, others in reduced(graph).items():
-        for other in others if room in places else ():
+        for other in sorted(others) if room in places else ():
             (x, y), (end, at) = places[room], places[other]
             if x - end > 1.5 * _STEP:  # around what stands between them
                 _arrow(axes, (x + _WIDTH / 2, y - _HEIGHT / 2), (end + _WIDTH, at), 1.0, way="angle,angleA=90,angleB=0")
