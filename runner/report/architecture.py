@@ -13,12 +13,14 @@ import itertools
 import sys
 import textwrap
 from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
+from springline.codegen.files import canonical_json
 from springline.runner.report.style import figure_files, house_style
 
 ROOT = Path(__file__).parents[2]
@@ -214,9 +216,20 @@ def _arrow(
         axes.text(begin[0] + 0.12, (begin[1] + end[1]) / 2, text, fontsize=9, va="center", color=_INK)
 
 
+def shown(root: Path = ROOT) -> str:
+    """Hash of what the picture shows, whatever draws it."""
+    graph = rooms(root)
+    arrows = {room: sorted(others) for room, others in reduced(graph).items()}
+    texts = {module: idea(root, module) for module in (*PACKAGES, *graph)}
+    between = sorted({(a.split(".")[0], b.split(".")[0]) for a, all_ in modules(root).items() for b in all_})
+    files = {package: own_files(root, package) for package in PACKAGES}
+    return sha256(canonical_json([arrows, texts, [list(pair) for pair in between], files])).hexdigest()
+
+
 def drawn(root: Path = ROOT) -> bytes:
-    """The picture as SVG; the same sources give the same bytes."""
-    return figure_files("architecture", picture(root))["architecture.svg"]
+    """The picture as SVG, with the hash of what it shows; the same sources and Matplotlib give the same bytes."""
+    image = figure_files("architecture", picture(root))["architecture.svg"]
+    return image.rstrip() + f"\n<!-- shown: {shown(root)} -->\n".encode()
 
 
 def main() -> int:

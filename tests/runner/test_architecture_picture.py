@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from springline.runner.report.architecture import PICTURE, drawn, level, reduced, rooms
+from springline.runner.report.architecture import PICTURE, drawn, level, reduced, rooms, shown
 
 ROOT = Path(__file__).parents[2]
 
 
 def test_the_page_has_the_picture_that_the_command_draws() -> None:
-    assert drawn(ROOT) == (ROOT / PICTURE).read_bytes(), "stale: run `make docs-pictures`"
+    said = f"<!-- shown: {shown(ROOT)} -->".encode()
+    assert said in (ROOT / PICTURE).read_bytes(), "stale: run `make docs-pictures`"
+    assert said in drawn(ROOT)
+    assert drawn(ROOT) == drawn(ROOT)
     assert f"]({PICTURE.relative_to('docs').as_posix()})" in (ROOT / "docs/architecture.md").read_text("utf-8")
 
 
