@@ -16,8 +16,9 @@ static const springline_real STEP = 1e-4;
 /* Time of plant step j, or of a part of the way to the next; never accumulated. */
 static springline_real time_of(long j, springline_real part) { return ((springline_real)j + part) * STEP; }
 
-static void print_row(springline_real t, const springline_reference *reference, const springline_state *state,
-                      const springline_command *command) {
+static void print_row(
+    springline_real t, const springline_reference *reference, const springline_state *state,
+    const springline_command *command) {
   printf("%.17g", (double)t);
   printf(",%.17g", (double)state->q1_lift);
   printf(",%.17g", (double)state->q1_rotation);

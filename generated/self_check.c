@@ -33,8 +33,9 @@ static bits bits_of(springline_real x) {
 }
 
 /* Says where the first difference is and returns 1, or returns 0. */
-static int differs(const char *what, long line, const char *const *names, int count, const springline_real *expected,
-                   const springline_real *got) {
+static int differs(
+    const char *what, long line, const char *const *names, int count,
+    const springline_real *expected, const springline_real *got) {
   int i, bit;
   for (i = 0; i < count; i++) {
     const bits difference = bits_of(expected[i]) ^ bits_of(got[i]);
@@ -47,8 +48,9 @@ static int differs(const char *what, long line, const char *const *names, int co
   return 0;
 }
 
-static void read_control(const springline_real *in, springline_reference *reference,
-                         springline_measurement *measurement) {
+static void read_control(
+    const springline_real *in, springline_reference *reference,
+    springline_measurement *measurement) {
   reference->q1d_lift = in[0];
   reference->q1d_rotation = in[1];
   reference->dq1d_lift = in[2];
@@ -63,8 +65,9 @@ static void read_control(const springline_real *in, springline_reference *refere
   measurement->dq2_rotation = in[11];
 }
 
-static int replay_control(springline_controller *controller, long line, const springline_real *in,
-                          const springline_real *expected) {
+static int replay_control(
+    springline_controller *controller, long line, const springline_real *in,
+    const springline_real *expected) {
   springline_reference reference;
   springline_measurement measurement;
   springline_command command;
@@ -95,8 +98,9 @@ static int replay_control(springline_controller *controller, long line, const sp
 }
 
 /* A sensor is out: the fallback has to be the first outputs of `expected`, or zero where it is NULL. */
-static int replay_fault(springline_controller *controller, long line, const springline_real *in,
-                        const springline_real *expected) {
+static int replay_fault(
+    springline_controller *controller, long line, const springline_real *in,
+    const springline_real *expected) {
   static const springline_real zero[COMMAND_OUT] = {0.0};
   springline_reference reference;
   springline_measurement measurement;
@@ -114,8 +118,9 @@ static int replay_fault(springline_controller *controller, long line, const spri
 }
 
 /* A controller that runs: what is refused changes nothing, what is taken keeps the last command, a reset forgets it. */
-static int replay_retuning(springline_controller *controller, long line, const springline_real *in,
-                           const springline_real *expected) {
+static int replay_retuning(
+    springline_controller *controller, long line, const springline_real *in,
+    const springline_real *expected) {
   springline_config config = springline_default_config;
   if (replay_control(controller, line, in, expected)) return 1;
   config.fallback = SPRINGLINE_FALLBACK_LAST;
@@ -162,8 +167,9 @@ static int replay_model(long line, const springline_real *in, const springline_r
   return differs("springline_control", line, control_outputs, MODEL_OUT, expected, got);
 }
 
-static int replay_plant(const springline_controller *controller, long line, const springline_real *in,
-                        const springline_real *expected) {
+static int replay_plant(
+    const springline_controller *controller, long line, const springline_real *in,
+    const springline_real *expected) {
   springline_state state;
   springline_command command;
   springline_base base[SPRINGLINE_BASE_NODES];

@@ -40,9 +40,10 @@ static int springline_is_finite(springline_real x) { return sl_isfinite(x); }
 /* ---- the model, printed from the frozen expressions ------------------------------------------------------- */
 
 /* Whether the acceleration that the law asks for is finite, before a_max; 118 operations */
-static int springline_evaluate_control(const springline_controller *controller, const springline_reference *reference,
-                                        const springline_measurement *measurement, springline_command *command,
-                                        springline_diagnostics *diagnostics) {
+static int springline_evaluate_control(
+    const springline_controller *controller, const springline_reference *reference,
+    const springline_measurement *measurement, springline_command *command,
+    springline_diagnostics *diagnostics) {
   (void)controller;
   const double control_k1 = 3.0;               /* SI; gain of the reaching law's first term */
   const double control_k2 = 5.0;               /* SI; gain of the reaching law's second term */
@@ -224,9 +225,9 @@ static int springline_evaluate_control(const springline_controller *controller, 
 }
 
 /* dx/dt; 106 operations */
-static void springline_evaluate_plant(const springline_controller *controller, const springline_base *base,
-                                      const springline_real *x, const springline_command *command,
-                                      springline_real *dx) {
+static void springline_evaluate_plant(
+    const springline_controller *controller, const springline_base *base, const springline_real *x,
+    const springline_command *command, springline_real *dx) {
   (void)controller, (void)base;
   const double plant_g = 9.8;           /* m/s^2; gravity */
   const double plant_k_s2 = 2000000.0;  /* N/m; stiffness of the lift spring */
@@ -483,9 +484,10 @@ int springline_reset(springline_controller *controller) {
   return SPRINGLINE_OK;
 }
 
-int springline_step(springline_controller *controller, const springline_reference *reference,
-                    const springline_measurement *measurement, springline_command *command,
-                    springline_diagnostics *diagnostics) {
+int springline_step(
+    springline_controller *controller, const springline_reference *reference,
+    const springline_measurement *measurement, springline_command *command,
+    springline_diagnostics *diagnostics) {
   springline_command wished = springline_no_command;
   springline_diagnostics seen = springline_no_diagnostics;
   int status = SPRINGLINE_OK;
@@ -514,8 +516,9 @@ int springline_step(springline_controller *controller, const springline_referenc
   return status;
 }
 
-int springline_plant_step(const springline_controller *controller, springline_state *state,
-                          const springline_command *command, const springline_base *base, springline_real step) {
+int springline_plant_step(
+    const springline_controller *controller, springline_state *state,
+    const springline_command *command, const springline_base *base, springline_real step) {
   const springline_base *motion[SPRINGLINE_BASE_NODES];
   springline_real x[8], at[8], next[8], slope[8];
   int i;
@@ -586,8 +589,9 @@ int springline_plant_step(const springline_controller *controller, springline_st
   return SPRINGLINE_OK;
 }
 
-int springline_measure(const springline_controller *controller, springline_state *state,
-                       springline_measurement *measurement) {
+int springline_measure(
+    const springline_controller *controller, springline_state *state,
+    springline_measurement *measurement) {
   if (controller == NULL || state == NULL || measurement == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
   measurement->q1_lift = state->q1_lift;
@@ -617,8 +621,9 @@ int springline_start(const springline_controller *controller, springline_state *
   return SPRINGLINE_OK;
 }
 
-int springline_signals(const springline_controller *controller, springline_real t, springline_reference *reference,
-                       springline_base *base) {
+int springline_signals(
+    const springline_controller *controller, springline_real t, springline_reference *reference,
+    springline_base *base) {
   if (controller == NULL || reference == NULL || base == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
   if (!springline_is_finite(t)) return SPRINGLINE_BAD_TIME;

@@ -176,3 +176,13 @@ def test_what_is_noted() -> None:
     assert labels == ["x_a", "x_b", "half_b", "outer_a_a", "outer_b_a", "outer_a_b", "outer_b_b"]
     assert {term.section for term in terms} == {("part", "(1)")}
     assert named("x", x) is x
+
+
+@pytest.mark.parametrize("prefix", ["springline", "p", "transfer_arm_controller"])
+def test_what_goes_over_several_lines_is_aligned_for_every_prefix(prefix: str) -> None:
+    loaded = load_scenario("paper/nominal")
+    files, _ = generate_files(bind(loaded.structure(), loaded.values(), prefix=prefix))
+    for name in (f"include/{prefix}.h", f"src/{prefix}.c", "main.c", "self_check.c"):
+        text = files[name].decode()
+        assert f"{prefix}_" in text
+        assert not re.findall(r"^ {10,}(?:const |\w+ \*)\w.*$", text, re.MULTILINE), name

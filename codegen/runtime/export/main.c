@@ -12,8 +12,9 @@ static const springline_real STEP = {{step}}{{f}};
 /* Time of plant step j, or of a part of the way to the next; never accumulated. */
 static springline_real time_of(long j, springline_real part) { return ((springline_real)j + part) * STEP; }
 
-static void print_row(springline_real t, const springline_reference *reference, const springline_state *state,
-                      const springline_command *command) {
+static void print_row(
+    springline_real t, const springline_reference *reference, const springline_state *state,
+    const springline_command *command) {
   printf("%.{{digits}}g", (double)t);
 {{print_fields}}
   printf("\n");

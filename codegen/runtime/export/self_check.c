@@ -29,8 +29,9 @@ static bits bits_of(springline_real x) {
 }
 
 /* Says where the first difference is and returns 1, or returns 0. */
-static int differs(const char *what, long line, const char *const *names, int count, const springline_real *expected,
-                   const springline_real *got) {
+static int differs(
+    const char *what, long line, const char *const *names, int count,
+    const springline_real *expected, const springline_real *got) {
   int i, bit;
   for (i = 0; i < count; i++) {
     const bits difference = bits_of(expected[i]) ^ bits_of(got[i]);
@@ -43,13 +44,15 @@ static int differs(const char *what, long line, const char *const *names, int co
   return 0;
 }
 
-static void read_control(const springline_real *in, springline_reference *reference,
-                         springline_measurement *measurement) {
+static void read_control(
+    const springline_real *in, springline_reference *reference,
+    springline_measurement *measurement) {
 {{control_from_vector}}
 }
 
-static int replay_control(springline_controller *controller, long line, const springline_real *in,
-                          const springline_real *expected) {
+static int replay_control(
+    springline_controller *controller, long line, const springline_real *in,
+    const springline_real *expected) {
   springline_reference reference;
   springline_measurement measurement;
   springline_command command;
@@ -67,8 +70,9 @@ static int replay_control(springline_controller *controller, long line, const sp
 }
 
 /* A sensor is out: the fallback has to be the first outputs of `expected`, or zero where it is NULL. */
-static int replay_fault(springline_controller *controller, long line, const springline_real *in,
-                        const springline_real *expected) {
+static int replay_fault(
+    springline_controller *controller, long line, const springline_real *in,
+    const springline_real *expected) {
   static const springline_real zero[COMMAND_OUT] = {{{zero}}};
   springline_reference reference;
   springline_measurement measurement;
@@ -85,8 +89,9 @@ static int replay_fault(springline_controller *controller, long line, const spri
 }
 
 /* A controller that runs: what is refused changes nothing, what is taken keeps the last command, a reset forgets it. */
-static int replay_retuning(springline_controller *controller, long line, const springline_real *in,
-                           const springline_real *expected) {
+static int replay_retuning(
+    springline_controller *controller, long line, const springline_real *in,
+    const springline_real *expected) {
   springline_config config = springline_default_config;
 {{memory_local}}  if ({{again}}replay_control(controller, line, in, expected)) return 1;
 {{memory_seen}}  config.fallback = SPRINGLINE_FALLBACK_LAST;
@@ -115,8 +120,9 @@ static int replay_model(long line, const springline_real *in, const springline_r
   return differs("springline_control", line, control_outputs, MODEL_OUT, expected, got);
 }
 
-static int replay_plant(const springline_controller *controller, long line, const springline_real *in,
-                        const springline_real *expected) {
+static int replay_plant(
+    const springline_controller *controller, long line, const springline_real *in,
+    const springline_real *expected) {
   springline_state state;
   springline_command command;
   springline_base base[SPRINGLINE_BASE_NODES];

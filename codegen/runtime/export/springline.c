@@ -22,16 +22,17 @@ static int springline_is_finite(springline_real x) { return {{math}}_isfinite(x)
 /* ---- the model, printed from the frozen expressions ------------------------------------------------------- */
 
 {{derive}}/* Whether the acceleration that the law asks for is finite, before a_max; {{control_operations}} operations */
-static int springline_evaluate_control(const springline_controller *controller, const springline_reference *reference,
-                                        const springline_measurement *measurement, springline_command *command,
-                                        springline_diagnostics *diagnostics{{ahead_parameter}}) {
+static int springline_evaluate_control(
+    const springline_controller *controller, const springline_reference *reference,
+    const springline_measurement *measurement, springline_command *command,
+    springline_diagnostics *diagnostics{{ahead_parameter}}) {
 {{control}}
 }
 
 /* dx/dt; {{plant_operations}} operations */
-static void springline_evaluate_plant(const springline_controller *controller, const springline_base *base,
-                                      const springline_real *x, const springline_command *command,
-                                      springline_real *dx) {
+static void springline_evaluate_plant(
+    const springline_controller *controller, const springline_base *base, const springline_real *x,
+    const springline_command *command, springline_real *dx) {
 {{plant}}
 }
 
@@ -113,9 +114,10 @@ int springline_reset(springline_controller *controller) {
 {{forget}}  return SPRINGLINE_OK;
 }
 
-int springline_step(springline_controller *controller, const springline_reference *reference,
-                    const springline_measurement *measurement, springline_command *command,
-                    springline_diagnostics *diagnostics) {
+int springline_step(
+    springline_controller *controller, const springline_reference *reference,
+    const springline_measurement *measurement, springline_command *command,
+    springline_diagnostics *diagnostics) {
   springline_command wished = springline_no_command;
   springline_diagnostics seen = springline_no_diagnostics;
 {{ahead_local}}  int status = SPRINGLINE_OK;
@@ -144,8 +146,9 @@ int springline_step(springline_controller *controller, const springline_referenc
   return status;
 }
 
-int springline_plant_step(const springline_controller *controller, springline_state *state,
-                          const springline_command *command, const springline_base *base, springline_real step) {
+int springline_plant_step(
+    const springline_controller *controller, springline_state *state,
+    const springline_command *command, const springline_base *base, springline_real step) {
   const springline_base *motion[SPRINGLINE_BASE_NODES];
   springline_real x[{{states}}], at[{{states}}], next[{{states}}]{{slopes}};
   int i;
@@ -165,8 +168,9 @@ int springline_plant_step(const springline_controller *controller, springline_st
   return SPRINGLINE_OK;
 }
 
-int springline_measure(const springline_controller *controller, springline_state *state,
-                       springline_measurement *measurement) {
+int springline_measure(
+    const springline_controller *controller, springline_state *state,
+    springline_measurement *measurement) {
   if (controller == NULL || state == NULL || measurement == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
 {{measure}}
@@ -180,8 +184,9 @@ int springline_start(const springline_controller *controller, springline_state *
   return SPRINGLINE_OK;
 }
 
-int springline_signals(const springline_controller *controller, springline_real t, springline_reference *reference,
-                       springline_base *base) {
+int springline_signals(
+    const springline_controller *controller, springline_real t, springline_reference *reference,
+    springline_base *base) {
   if (controller == NULL || reference == NULL || base == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
   if (!springline_is_finite(t)) return SPRINGLINE_BAD_TIME;

@@ -86,9 +86,10 @@ int springline_reset(springline_controller *controller);
 /*
  * {{step_meaning}}
  */
-int springline_step(springline_controller *controller, const springline_reference *reference,
-                    const springline_measurement *measurement, springline_command *command,
-                    springline_diagnostics *diagnostics);
+int springline_step(
+    springline_controller *controller, const springline_reference *reference,
+    const springline_measurement *measurement, springline_command *command,
+    springline_diagnostics *diagnostics);
 
 /* When a plant step needs the base's motion, in parts of the step: 0 is its start, 1 its end. */
 #define SPRINGLINE_BASE_NODES {{base_nodes}}
@@ -99,19 +100,22 @@ extern const springline_real springline_base_nodes[{{base_nodes}}];
  * constant command. base[i] is the base's motion at springline_base_nodes[i]; base = NULL for a base at rest. If it fails
  * *state is left as it was.
  */
-int springline_plant_step(const springline_controller *controller, springline_state *state,
-                          const springline_command *command, const springline_base *base, springline_real step);
+int springline_plant_step(
+    const springline_controller *controller, springline_state *state,
+    const springline_command *command, const springline_base *base, springline_real step);
 
 /* What the sensors show of the plant's state, one sample of it. */
-int springline_measure(const springline_controller *controller, springline_state *state,
-                       springline_measurement *measurement);
+int springline_measure(
+    const springline_controller *controller, springline_state *state,
+    springline_measurement *measurement);
 
 /* The plant's initial state. */
 int springline_start(const springline_controller *controller, springline_state *state);
 
 /* {{signals_meaning}} */
-int springline_signals(const springline_controller *controller, springline_real t, springline_reference *reference,
-                       springline_base *base);
+int springline_signals(
+    const springline_controller *controller, springline_real t, springline_reference *reference,
+    springline_base *base);
 
 /* What a status means and what to do about it, one English sentence; never NULL. */
 const char *springline_status_text(int status);
