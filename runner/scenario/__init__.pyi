@@ -15,6 +15,7 @@ from .scenario import load_scenario as load_scenario
 from .scenario import parse_set as parse_set
 from .scenario import per_run as per_run
 from .schema import DOORS as DOORS
+from .schema import DOOR_KEYS as DOOR_KEYS
 from .schema import given_text as given_text
 from .schema import names_file as names_file
 from .schema import number_text as number_text

@@ -331,10 +331,9 @@ class Scenario:
 
     def _canonical(self, overrides: Mapping[str, object], where: str) -> dict[str, object]:
         """Overrides that name users' classes as the document does, so that the same one is known for the same."""
-        doors = {f"{table}.{key}" for table, key in schema.DOORS}
         return {
             key: canonical_reference(str(value), self.folder, where, key)
-            if key in doors and schema.names_file(value)
+            if key in schema.DOOR_KEYS and schema.names_file(value)
             else value
             for key, value in overrides.items()
         }

@@ -280,6 +280,8 @@ DOORS: Mapping[tuple[str, str], tuple[Registry[Any], str]] = {
     ("control", "law"): (LAWS, _DEFAULT.law),
 }
 """Table and key that may name a class of a user's file -> what else it may name, and what it is by default."""
+DOOR_KEYS = tuple(f"{table}.{key}" for table, key in DOORS)
+"""They as dotted keys."""
 
 
 @lru_cache

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from springline.runner.files import InputError, Problem, unknown, value_text
 from springline.runner.run import field, metrics_schema, metrics_table, trajectory_schema
 from springline.runner.scenario import (
-    DOORS,
+    DOOR_KEYS,
     Record,
     Scenario,
     UserClass,
@@ -280,7 +280,6 @@ class Plan:
         Beside it what names it in the values of a key that varies.
         """
         found: dict[str, tuple[UserClass, list[str]]] = {}
-        keys = [f"{table}.{key}" for table, key in DOORS]
         for scenario, constants in ((self.sweep.scenario, {}), *((g.scenario, g.constants) for g in self.groups)):
             for user in scenario.code:
                 stem, earlier = Path(user.path).stem, 1
@@ -289,7 +288,7 @@ class Plan:
                     earlier += 1
                     name = f"{stem}-{earlier}.py:{user.name}"
                 _, given = found.setdefault(name, (user, []))
-                named = [str(constants[key]) for key in keys if constants.get(key) is not None]
+                named = [str(constants[key]) for key in DOOR_KEYS if constants.get(key) is not None]
                 given += [
                     text
                     for text in named

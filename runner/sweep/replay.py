@@ -14,6 +14,7 @@ import pyarrow as pa
 from springline.codegen.files import canonical_json
 from springline.runner.files import InputError, Problem, read_toml
 from springline.runner.scenario import (
+    DOOR_KEYS,
     DOORS,
     Scenario,
     UserClass,
@@ -117,7 +118,7 @@ def _found(axis: Axis, kept: dict[str, str]) -> Axis:
     """An axis whose values are where the files are that they name: CSV files in the dataset, users' where they lie."""
     if axis.key in path_keys():
         return replace(axis, values=tuple(kept[value] for value in axis.values))
-    if axis.key in {f"{table}.{key}" for table, key in DOORS}:
+    if axis.key in DOOR_KEYS:
         return replace(axis, values=tuple(kept[value] if names_file(value) else value for value in axis.values))
     return axis
 
