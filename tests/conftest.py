@@ -13,8 +13,7 @@ import casadi as ca
 import pytest
 from hypothesis import settings
 
-from springline.model.mechanisms import MECHANISMS
-from springline.model.mechanisms.mechanism import Mechanism
+from springline.model.mechanisms import MECHANISMS, Mechanism
 from springline.model.parameters import POSITIVE, Joint, Parameter, Values
 from springline.model.signals import SineTerm
 

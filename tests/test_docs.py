@@ -23,11 +23,10 @@ import pytest
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
-from springline.codegen.kernel.toolchain import find_compiler
+from springline.codegen.kernel import toolchain
 from springline.runner.cli import app
-from springline.runner.scenario import scenario as scenarios
-from springline.runner.scenario.locate import kind_of
-from springline.runner.sweep import sweep as sweeps
+from springline.runner.scenario import Scenario, load_scenario
+from springline.runner.sweep import load_sweep
 
 ROOT = Path(__file__).parent.parent
 OTHERS = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "examples/README.md")]
@@ -37,7 +36,7 @@ PROGRAMS = ("springline", "make", "pip", "python", "fmpy")
 STEPS = 100  # of every documented run
 
 ELSEWHERE = {
-    "make reproduce": "minutes; tests/runner/test_paper.py reproduces a group",
+    "make reproduce": "minutes; tests/runner/paper/test_paper.py reproduces a group",
     "make test": "this very test among them",
 }
 """Commands that are not run here, and why not."""
@@ -94,19 +93,18 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def shorten(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the commands simulate for some steps only."""
-    load_scenario, load_sweep = scenarios.load_scenario, sweeps.load_sweep
 
-    def short(scenario: scenarios.Scenario) -> scenarios.Scenario:
+    def short(scenario: Scenario) -> Scenario:
         return scenario.with_overrides({"simulation.duration": STEPS * scenario.step})
 
-    def loaded(*arguments: Any, **options: Any) -> scenarios.Scenario:
+    def loaded(*arguments: Any, **options: Any) -> Scenario:
         return short(load_scenario(*arguments, **options))
 
-    def swept(*arguments: Any, **options: Any) -> sweeps.Sweep:
+    def swept(*arguments: Any, **options: Any) -> Any:
         whole = load_sweep(*arguments, **options)
         return replace(whole, scenario=short(whole.scenario))
 
-    # tests/runner/test_plots.py looks at the figures, whose drawing would take most of the time.
+    # tests/runner/run/test_plots.py looks at the figures, whose drawing would take most of the time.
     def files(name: str, _: Figure) -> dict[str, bytes]:
         return {f"{name}.png": b"", f"{name}.svg": b""}
 
@@ -154,10 +152,10 @@ def run_toml(block: Block) -> None:
     file = shown_file(block) or Path("documented.toml")
     file.write_text(block.text, encoding="utf-8")
     try:
-        if kind_of(document) == "sweep":
-            sweeps.load_sweep(file)
+        if "vary" in document:
+            load_sweep(file)
         else:
-            scenarios.load_scenario(file)
+            load_scenario(file)
     except Exception as error:
         raise AssertionError(f"{block}: {error!r}") from error
 
@@ -187,7 +185,7 @@ def run_c(block: Block) -> None:
     assert made.exit_code == 0, made.output
     flags = ["-std=c99", "-Wall", "-Werror", "-fno-builtin", "-fsyntax-only", "-Idocumented/include", "-x", "c", "-"]
     done = subprocess.run(
-        [*find_compiler().argv, *flags],
+        [*toolchain.find_compiler().argv, *flags],
         input=C_AROUND.format(text=block.text),
         check=False,
         capture_output=True,

@@ -7,8 +7,8 @@ import pkgutil
 
 import pytest
 
-from springline.model.control.reaching import Law
-from springline.model.mechanisms.mechanism import Mechanism
+from springline.model.control import Law
+from springline.model.mechanisms import Mechanism
 
 PACKAGES = ("springline.model", "springline.codegen", "springline.runner")
 

@@ -19,8 +19,7 @@ from springline.benchmarks import against, command, harness, math_speed, problem
 from springline.benchmarks import report as bench
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, handwritten_c, ours
-from springline.codegen.kernel.compiled import kernel
-from springline.codegen.kernel.spec import KernelOptions
+from springline.codegen.kernel import KernelOptions, kernel
 
 TINY = harness.Effort(
     rounds=1, sample=1e-3, adaptive=problem.QUANTUM, compared=problem.QUANTUM, comparison=1e-3, compilers=False

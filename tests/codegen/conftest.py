@@ -10,8 +10,8 @@ import pytest
 from fmi_client import SAMPLED, Client, Values, arm
 from numpy.typing import NDArray
 
-from springline.codegen.export.fmu.settings import Settings
-from springline.codegen.program.frozen import Program, program
+from springline.codegen.export.fmu import Settings
+from springline.codegen.program import Program, program
 from springline.model.structure import SignalShape, Structure
 
 NOMINAL = {

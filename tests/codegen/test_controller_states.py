@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,21 +11,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from arms import structure_of, values_of
 from fmi_client import Client, client_library
 from scipy.integrate import solve_ivp
-from test_one_loop import structure_of, values_of
 
-from springline.codegen.export.bound import bind
-from springline.codegen.export.c.tree import generate_files
-from springline.codegen.export.fmu.archive import fmu
-from springline.codegen.export.fmu.settings import Settings
-from springline.codegen.files.manifest import write_tree
-from springline.codegen.kernel.compiled import kernel
-from springline.codegen.kernel.runs import METRICS, Runs
-from springline.codegen.kernel.settings import LoopSettings
-from springline.codegen.kernel.spec import KernelOptions, KernelSpec
-from springline.model.control.controller import ArmModel, Control, Controller, Rates
-from springline.model.control.registry import CONTROLLERS
+from springline.codegen.export import bind
+from springline.codegen.export.c import generate_files
+from springline.codegen.export.fmu import Settings, fmu
+from springline.codegen.files import write_tree
+from springline.codegen.kernel import METRICS, KernelOptions, KernelSpec, LoopSettings, Runs, kernel
+from springline.model.control import CONTROLLERS, ArmModel, Control, Controller
 from springline.model.parameters import NON_NEGATIVE, POSITIVE, Parameter, Values
 from springline.model.quantities import SIGMA, Quantity
 from springline.model.structure import Structure
@@ -51,6 +47,9 @@ class IntegralAction(Controller):
         return Control(u, e, lambda limited: {"xi": e + p.unwinding * (limited - u)})
 
 
+Update = Callable[[ca.SX], dict[str, ca.SX]]
+
+
 class IntegralSurface(Controller):
     """A surface with an integral, two states of which one is a scalar, and an update of its own for samples."""
 
@@ -64,7 +63,7 @@ class IntegralSurface(Controller):
         u = arm.H @ (r.ddq + 10 * de + 25 * e + 10 * sigma / ca.sqrt(1 + sigma**2)) + arm.c + arm.G
         return Control(u, e, {"effort": ca.dot(u, u) - z.effort, "xi": e}, {"sigma": sigma})
 
-    def update(self, r: Values, y: Values, z: Values, model: ArmModel, p: Values, h: ca.SX) -> Rates:
+    def update(self, r: Values, y: Values, z: Values, model: ArmModel, p: Values, h: ca.SX) -> Update:
         return lambda u: {"xi": z.xi + h * (r.q - y.q1), "effort": z.effort * ca.exp(-h) + h * ca.dot(u, u)}
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from springline.codegen.numbers import double, doubles
 from springline.runner import batch, load_scenario
-from springline.runner.files.errors import InputError
-from springline.runner.scenario.scenario import Scenario
+from springline.runner.files import InputError
+from springline.runner.scenario import Scenario
 
 NUMBERS = np.array([1.5, -0.0, 3.0e-310, 2.0**60, np.inf])
 

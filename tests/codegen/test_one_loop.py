@@ -12,22 +12,19 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from arms import structure_of, values_of
 from fmi_client import Client, client_library
 
-from springline.codegen.export.bound import bind
-from springline.codegen.export.c.tree import generate_files
+from springline.codegen.export import bind
+from springline.codegen.export.c import generate_files
+from springline.codegen.export.fmu import Settings, fmu
 from springline.codegen.export.fmu import archive as fmu_module
-from springline.codegen.export.fmu.archive import fmu
-from springline.codegen.export.fmu.settings import Settings
-from springline.codegen.files.manifest import write_tree
-from springline.codegen.kernel.compiled import kernel
-from springline.codegen.kernel.settings import LoopSettings
-from springline.codegen.kernel.spec import KernelOptions, KernelSpec
-from springline.codegen.program.frozen import program
+from springline.codegen.files import write_tree
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS
 from springline.model.quantities import Q1, Quantity
-from springline.model.structure import SignalShape, Structure
+from springline.model.structure import Structure
 from springline.model.system import System
 
 pytestmark = pytest.mark.usefixtures("other_arms")
@@ -75,26 +72,6 @@ def _made_up_effects() -> Iterator[None]:
     yield
     for effect in effects:
         del EFFECTS[effect.name]
-
-
-def structure_of(mechanism: str, **changes: Any) -> Structure:
-    arm = MECHANISMS[mechanism]
-    terms = tuple(len(t) for t in arm.reference_terms)
-    given = {"reference": SignalShape("sine", terms), "base_motion": SignalShape("sine", (1, 1, 1))} | changes
-    return Structure(mechanism=mechanism, **given)
-
-
-def values_of(structure: Structure) -> np.ndarray:
-    """The mechanism's own reference and start, under a base that moves; U_max low enough to limit now and then."""
-    arm = MECHANISMS[structure.mechanism]
-    given = {"base_motion.shake.0.amplitude": 0.1, "base_motion.shake.0.omega": 9.0,
-             "base_motion.pitch.0.amplitude": 0.05, "base_motion.pitch.0.omega": 3.0}  # fmt: skip
-    for i, joint in enumerate(arm.joints):
-        given |= {f"initial.q.{i}": arm.start_position[i], f"reference.{joint.name}.offset": arm.reference_offset[i]}
-        for k, term in enumerate(arm.reference_terms[i]):
-            stem = f"reference.{joint.name}.terms.{k}"
-            given |= {f"{stem}.amplitude": term.amplitude, f"{stem}.omega": term.omega, f"{stem}.phase": term.phase}
-    return np.array([given.get(slot.key, slot.default) for slot in program(structure).system.slots])
 
 
 def rows_of(structure: Structure, sampled: bool, every: int = HOLD, **options: Any) -> np.ndarray:

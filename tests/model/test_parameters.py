@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springline.model.control.reaching import LAWS
+from springline.model.control import LAWS
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import (
     EVEN,

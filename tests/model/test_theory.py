@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from springline.model.control.sliding import SurfaceExponents
+from springline.model.control import SurfaceExponents
 from springline.model.theory import (
     Gap,
     felt_acceleration,

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from springline.codegen.export.bound import Export
+from springline.codegen.export import Export
 from springline.codegen.export.c import tree
 from springline.codegen.kernel import source, toolchain
 
@@ -32,8 +32,8 @@ def _generated_once(export: Export) -> Generated:
 def _no_work_that_other_tests_look_at() -> Iterator[None]:
     """In this process.
 
-    Costly optimisations change no bit of a kernel, which codegen/test_engines.py shows; equal exports give equal files,
-    which codegen/test_api.py does.
+    Costly optimisations change no bit of a kernel, which codegen/kernel/test_engines.py shows; equal exports give
+    equal files, which codegen/export/c/test_api.py does.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(source, "best_flags", lambda compiler: ("-O1",))

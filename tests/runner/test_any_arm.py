@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from springline.runner import batch, load_scenario, simulate
 from springline.runner.cli import app
-from springline.runner.files.errors import InputError
+from springline.runner.files import InputError
 
 pytestmark = pytest.mark.usefixtures("other_arms")
 

@@ -14,10 +14,9 @@ from typer.testing import CliRunner, Result
 
 from springline.runner import batch, load_scenario, simulate
 from springline.runner.cli import app
-from springline.runner.files.errors import InputError
-from springline.runner.scenario.scenario import Scenario
-from springline.runner.sweep.dataset import read_dataset
-from springline.runner.sweep.sweep import load_sweep
+from springline.runner.files import InputError
+from springline.runner.scenario import Scenario
+from springline.runner.sweep import load_sweep, read_dataset
 
 RECORD = {
     "kind": "table",

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from springline.codegen.export.names import check_files, check_prefix
+from springline.codegen.export import check_files
+from springline.codegen.export.names import check_prefix
 
 
 def accepted(prefix: str) -> bool:

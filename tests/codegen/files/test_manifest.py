@@ -16,9 +16,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from springline.codegen.files import Changes, FolderConflict, Stale, canonical_json, check_tree, summary, write_tree
 from springline.codegen.files.atomic import workplace
-from springline.codegen.files.canonical import canonical_json
-from springline.codegen.files.manifest import Changes, FolderConflict, Stale, check_tree, summary, write_tree
 
 OLD = {"include/a.h": b"int a;\n", "src/a.c": b"int a = 1;\n", "src/gone/b.c": b"int b;\n"}
 NEW = {"include/a.h": b"int a;\n", "src/a.c": b"int a = 2;\n", "README.md": b"# a\n"}

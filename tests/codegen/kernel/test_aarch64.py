@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, print_kernel
 from springline.codegen.kernel.compiled import compile_kernel
-from springline.codegen.kernel.settings import LoopSettings
-from springline.codegen.kernel.source import print_kernel
-from springline.codegen.kernel.spec import KernelOptions, KernelSpec
-from springline.codegen.program.frozen import Program
+from springline.codegen.program import Program
 
 # Reads the parameters of all runs as raw doubles, simulates, writes final states and metrics as raw doubles.
 DRIVER = """

@@ -5,8 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from springline.codegen.kernel.c_tokens import tokens
-from springline.codegen.kernel.source import runtime_sources
+from springline.codegen.kernel import runtime_sources, tokens
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,7 @@ import pytest
 from scipy.integrate._ivp import dop853_coefficients, rk
 from scipy.linalg import expm
 
-from springline.codegen.kernel.compiled import kernel
-from springline.codegen.kernel.settings import LoopSettings
-from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System

@@ -6,10 +6,8 @@ from typing import Any
 
 import pytest
 
-from springline.codegen.kernel.compiled import kernel
-from springline.codegen.kernel.source import print_kernel
-from springline.codegen.kernel.spec import KernelOptions, KernelSpec
-from springline.codegen.program.frozen import program
+from springline.codegen.kernel import KernelOptions, KernelSpec, kernel, print_kernel
+from springline.codegen.program import program
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 

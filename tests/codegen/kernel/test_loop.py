@@ -11,19 +11,27 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from springline.codegen.kernel import (
+    METRICS,
+    MOST_STEPS,
+    STATUS,
+    Kernel,
+    KernelOptions,
+    KernelSpec,
+    LoopSettings,
+    Runs,
+    Watch,
+    quantity_name,
+    toolchain,
+)
 from springline.codegen.kernel import compiled as kernel_module
 from springline.codegen.kernel import source as kernel_source
-from springline.codegen.kernel import toolchain
-from springline.codegen.kernel.compiled import Kernel, LayoutError, Watch, compile_kernel
+from springline.codegen.kernel.compiled import LayoutError, compile_kernel
 from springline.codegen.kernel.job import JOB, Job
-from springline.codegen.kernel.runs import METRICS, STATUS, Runs, quantity_name
-from springline.codegen.kernel.settings import MOST_STEPS, LoopSettings
-from springline.codegen.kernel.spec import KernelOptions, KernelSpec
-from springline.codegen.program.frozen import Program, program
-from springline.codegen.program.tables import SignalTable
+from springline.codegen.program import Program, SignalTable, program
 from springline.model import quantities
 from springline.model.structure import SignalShape, Structure
-from springline.model.symbolic.linear import as_written
+from springline.model.symbolic import as_written
 
 Values = Callable[..., NDArray[np.float64]]
 # Low levels of optimisation, for they change no bit: test_engines.py compares them with all others.

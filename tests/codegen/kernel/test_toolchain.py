@@ -17,13 +17,11 @@ from typing import NamedTuple
 
 import pytest
 
-from springline.codegen.kernel import toolchain
+from springline.codegen.kernel import ToolchainError, checks, toolchain
 from springline.codegen.kernel.toolchain import (
     Compiler,
-    ToolchainError,
     build_library,
     cache_root,
-    checks,
     find_compiler,
     load,
     native_flags,

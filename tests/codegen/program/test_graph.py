@@ -5,7 +5,7 @@ import math
 import casadi as ca
 import pytest
 
-from springline.codegen.program.graph import Binding, ValueGraph
+from springline.codegen.program import Binding, ValueGraph
 
 
 def limited(limit: float) -> list[int | None]:

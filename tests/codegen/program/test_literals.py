@@ -6,9 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from springline.codegen.kernel import toolchain
-from springline.codegen.kernel.source import runtime_sources
-from springline.codegen.program.literals import constant_expression, literal
+from springline.codegen.kernel import runtime_sources, toolchain
+from springline.codegen.program import constant_expression, literal
 
 NUMBERS = [0.0, -0.0, 1.0, 40.0, 0.1, -1 / 3, 1e7, 123456789.0, 1e16, 2.0**60, 1e-5, 3e-25, 5e-324,
            1.7976931348623157e308, math.inf, -math.inf]  # fmt: skip

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen.kernel import toolchain
-from springline.codegen.kernel.source import runtime_sources
-from springline.codegen.program.casadi_c import print_functions
-from springline.codegen.program.frozen import Program
+from springline.codegen.kernel import runtime_sources, toolchain
+from springline.codegen.program import Program, print_functions
 
 Values = Callable[..., NDArray[np.float64]]
 SAMPLES = 1000

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from springline.codegen.program.frozen import Program, count_operations
+from springline.codegen.program import Program, count_operations
 from springline.codegen.program.staging import split
 
 UNARY = [

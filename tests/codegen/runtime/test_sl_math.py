@@ -23,7 +23,7 @@ Bits = NDArray[np.uint64]
 RequireTool = Callable[..., str]
 
 RUNTIME = Path(str(resources.files("springline.codegen"))) / "runtime"
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[3]
 
 THIRD = 1.0 / 3.0
 LISTED = {

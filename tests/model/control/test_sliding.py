@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from springline.model.control.controller import ArmModel
-from springline.model.control.reaching import LAWS, Law, reaching_rate
-from springline.model.control.sliding import SurfaceExponents, surface
+from springline.model.control import LAWS, ArmModel, Law, SurfaceExponents
+from springline.model.control.reaching import reaching_rate
+from springline.model.control.sliding import surface
 from springline.model.control.terminal_sliding import TerminalSliding
 from springline.model.drive import DRIVES
 from springline.model.lagrange import equations_of_motion

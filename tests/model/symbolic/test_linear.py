@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from springline.model.symbolic.linear import as_written, over, solve_spd
+from springline.model.symbolic import as_written, over, solve_spd
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 6])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springline.model.symbolic.normal_form import collect
+from springline.model.symbolic import collect
 
 SYMBOLS = ca.SX.sym("v", 5)
 FAST, SLOW = SYMBOLS[:2], SYMBOLS[2:4]

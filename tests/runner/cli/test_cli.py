@@ -19,23 +19,22 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from stored import read_table
 from typer.testing import CliRunner, Result
 
 from springline import __version__
 from springline.benchmarks import command as bench
 from springline.benchmarks.contenders import CONTENDERS
-from springline.codegen.files.manifest import Changes, write_tree
-from springline.codegen.kernel.compiled import kernel
-from springline.model.control.reaching import LAWS
+from springline.codegen.files import Changes, write_tree
+from springline.codegen.kernel import kernel
+from springline.model.control import LAWS
 from springline.runner.cli import app, terminal
 from springline.runner.cli.commands import run as run_command
-from springline.runner.files.errors import InputError
-from springline.runner.files.storage import read_table, units
+from springline.runner.files import InputError, units
 from springline.runner.paper import reproduction
 from springline.runner.paper.evidence import Check, Finding
-from springline.runner.run.simulation import simulate
-from springline.runner.scenario.locate import packaged_scenarios, packaged_sweeps
-from springline.runner.scenario.scenario import load_scenario, parse_set
+from springline.runner.run import simulate
+from springline.runner.scenario import load_scenario, packaged_scenarios, packaged_sweeps, parse_set
 
 MAIN = "from springline.runner.cli import main; main()"
 FIGURES = {"tracking", "error", "force", "sliding", "springs", "steady_state", "base_motion"}
@@ -294,7 +293,7 @@ EVERY = {
     "reproduce": ["reproduce"],
     "bench": ["bench"],
 }
-"""Every command that writes a folder, but for batch and replay (tests/runner/test_dataset.py)."""
+"""Every command that writes a folder, but for batch and replay (tests/runner/sweep/test_dataset.py)."""
 
 
 @pytest.mark.parametrize("command", EVERY.values(), ids=EVERY.keys())
@@ -758,7 +757,7 @@ def test_bench_says_which_contenders_there_are(elsewhere: Path) -> None:
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    """A paper that is reproduced at once (tests/runner/test_paper.py has the real one); what the command asked for."""
+    """A paper that is reproduced at once (paper/test_paper.py has the real one); what the command asked for."""
     seen: list[object] = []
     row = {"group": 2, "case": "power", "joint": "lift", "measure": "settling_time", "unit": "s"}
 

@@ -18,7 +18,7 @@ from typer.testing import CliRunner, Result
 from springline.codegen.kernel import toolchain
 from springline.runner.cli import app
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "fmu_coupling.py"
+EXAMPLE = Path(__file__).parents[3] / "examples" / "fmu_coupling.py"
 
 
 def springline(*arguments: str | Path) -> Result:

@@ -13,11 +13,11 @@ import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from stored import read_table
 
-from springline.codegen.files.atomic import write_file
-from springline.runner.files import storage
-from springline.runner.files.storage import read_table, table_files, units, write_folder
-from springline.runner.run.columns import field
+from springline.codegen.files import write_file
+from springline.runner.files import storage, table_files, units, write_folder
+from springline.runner.run import field
 
 SCHEMA = pa.schema([field("t", "s"), field("force", "N m"), field("status", "", pa.string())])
 TABLE = pa.table(

@@ -21,18 +21,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springline.codegen.files.manifest import FolderConflict
-from springline.runner.files.errors import InputError
-from springline.runner.paper import reproduction
-from springline.runner.paper.cases import CASES, GROUPS, JOINTS, MEASURES, cases
+from springline.codegen.files import FolderConflict
+from springline.runner.files import InputError
+from springline.runner.paper import GROUPS, reproduce, reproduction
+from springline.runner.paper.cases import CASES, JOINTS, MEASURES, cases
 from springline.runner.paper.figures import FIGURES, OPEN_FIGURES
 from springline.runner.paper.measured import Measured
 from springline.runner.paper.report import change, number, plain
-from springline.runner.paper.reproduction import Reproduction, reproduce
+from springline.runner.paper.reproduction import Reproduction
 from springline.runner.paper.runs import E8_SHAKE, measure, reaching_law, theory_of, with_velocities
-from springline.runner.run.simulation import simulate
-from springline.runner.scenario.locate import packaged_scenarios
-from springline.runner.scenario.scenario import load_scenario
+from springline.runner.run import simulate
+from springline.runner.scenario import load_scenario, packaged_scenarios
 
 
 def seen(**overrides: Any) -> Measured:

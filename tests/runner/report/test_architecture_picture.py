@@ -6,7 +6,7 @@ from pathlib import Path
 
 from springline.runner.report.architecture import PICTURE, drawn, level, reduced, rooms, shown
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def test_the_page_has_the_picture_that_the_command_draws() -> None:

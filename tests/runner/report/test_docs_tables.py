@@ -9,9 +9,10 @@ import pytest
 from springline.model.parameters import Joint
 from springline.model.quantities import Quantity
 from springline.model.system import System
-from springline.runner.report.docs_tables import put, table, tables, written
+from springline.runner.report import put
+from springline.runner.report.docs_tables import table, tables, written
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def test_the_page_has_the_tables_that_the_command_writes() -> None:

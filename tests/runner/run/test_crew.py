@@ -2,20 +2,15 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from threading import Event
 
 import numpy as np
 import pytest
 
-from springline.codegen.kernel.compiled import Watch, kernel
-from springline.codegen.kernel.runs import STATUS, Runs
-from springline.codegen.kernel.settings import LoopSettings
-from springline.codegen.kernel.spec import ONE_RUN, KernelSpec
+from springline.codegen.kernel import ONE_RUN, STATUS, KernelSpec, LoopSettings, Runs, Watch, kernel
 from springline.model.structure import Structure
 from springline.model.system import System
-from springline.runner.run.crew import Crew, results
-from springline.runner.sweep.work import perform
+from springline.runner.run import Crew, results
 
 LONG = LoopSettings(1_000_000_000, 1e-5)  # minutes
 
@@ -45,17 +40,6 @@ def test_ctrl_c_while_waiting_ends_the_calls(call: Callable[[Watch], Runs]) -> N
     with pytest.raises(KeyboardInterrupt), Crew(1) as crew:
         results([future := crew.begin(call)], interrupt)
     assert STATUS[future.result().status[0]] == "stopped"
-
-
-def test_kept_runs_are_stopped_too_and_counted_once() -> None:
-    loop = kernel(KernelSpec(Structure(), options=ONE_RUN))
-    values = np.array([[slot.default for slot in System().slots]] * 4)
-    watch = Watch()
-    perform(loop, LoopSettings(5000, 1e-5, output_every=500), (), values, [0, 2], watch)
-    assert watch.progress.value == 4 * 5000
-    watch.stop.value = 1
-    stopped = perform(loop, replace(LONG, output_every=100_000_000), (), values, [0, 2], watch)
-    assert [len(rows) < 5 for rows in stopped.trajectories] == [True, True]
 
 
 def test_results_come_in_order_and_the_progress_with_them() -> None:

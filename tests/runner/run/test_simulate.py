@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from springline.codegen.kernel.runs import METRICS, Runs
-from springline.codegen.kernel.settings import MOST_STEPS, LoopSettings
+from springline.codegen.kernel import METRICS, MOST_STEPS, LoopSettings, Runs
 from springline.runner.cli import app
-from springline.runner.files.errors import InputError
-from springline.runner.run.columns import metrics_schema
-from springline.runner.run.simulation import outcome, simulate
-from springline.runner.scenario.scenario import load_scenario
+from springline.runner.files import InputError
+from springline.runner.run import metrics_schema, simulate
+from springline.runner.run.simulation import outcome
+from springline.runner.scenario import load_scenario
 
 
 def springline(*arguments: str | Path) -> Result:

@@ -15,14 +15,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springline.model.control.reaching import LAWS
+from springline.model.control import LAWS
 from springline.model.parameters import Bounds
 from springline.model.structure import SignalShape, Structure
-from springline.runner.files.errors import InputError
-from springline.runner.files.toml_text import value_text
-from springline.runner.scenario.locate import packaged_scenarios
-from springline.runner.scenario.scenario import Scenario, load_scenario, parse_set
-from springline.runner.scenario.splines import kernel_tables
+from springline.runner.files import InputError, value_text
+from springline.runner.scenario import Scenario, kernel_tables, load_scenario, packaged_scenarios, parse_set
 
 GROUPS = {
     "paper/group1_shake": {},

@@ -10,22 +10,13 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyder, polyval
 
-from springline.codegen.program import tables
-from springline.runner.files.errors import InputError
-from springline.runner.scenario.splines import (
-    ENDS,
-    HALF_TURN,
-    UNITS,
-    Column,
-    Ends,
-    Spline,
-    kernel_tables,
-    read_table,
-    spline,
-)
+from springline.codegen.program import SignalTable
+from springline.runner.files import InputError
+from springline.runner.scenario import kernel_tables
+from springline.runner.scenario.splines import ENDS, HALF_TURN, UNITS, Column, Ends, Spline, read_table, spline
 
-DATA = Path(__file__).parent.parent / "data"
-Knots = Spline | tables.SignalTable
+DATA = Path(__file__).parents[2] / "data"
+Knots = Spline | SignalTable
 
 
 def evaluate(table: Knots, t: np.ndarray, derivative: int = 0) -> np.ndarray:

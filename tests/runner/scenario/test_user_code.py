@@ -1,7 +1,6 @@
 """Mechanisms, laws and controllers of a user's own file: used wherever the packaged ones are, and never unasked."""
 
 import json
-import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -14,14 +13,10 @@ from typer.testing import CliRunner
 
 from springline.codegen.kernel import toolchain
 from springline.runner.cli import app
-from springline.runner.files.errors import InputError
-from springline.runner.run.simulation import simulate
-from springline.runner.scenario.scenario import load_scenario
-from springline.runner.scenario.user_code import without_code
-from springline.runner.sweep.arrays import batch
-from springline.runner.sweep.plan import Plan
-from springline.runner.sweep.sweep import load_sweep
-from springline.runner.sweep.work import parcel
+from springline.runner.files import InputError
+from springline.runner.run import simulate
+from springline.runner.scenario import load_scenario, without_code
+from springline.runner.sweep import batch
 
 LAW = """
 import casadi as ca
@@ -440,24 +435,3 @@ def test_a_fault_of_our_own_is_none_of_the_user_s(folder: Path, monkeypatch: pyt
     (folder / "law.py").write_text(LAW + "# as no other test has it\n")
     with pytest.raises(KeyError, match="of ours"):
         load_scenario(folder / "law.toml")
-
-
-def test_workers_need_no_file(folder: Path, dataset: Path) -> None:
-    """A parcel is simulated where nothing of the user's can be read or run."""
-    plan = Plan(load_sweep(folder / "sweep.toml"))
-    chunk = plan.chunk(0)
-    sent = pickle.dumps((parcel(chunk.group.work), plan.parameters(chunk, plan.columns(chunk))))
-    (folder / "parcel").write_bytes(sent)
-    for file in ("law.py", "helper.py", "law.toml"):
-        (folder / file).unlink()
-    program = (
-        "import pickle, sys; from springline.runner.sweep.work import perform_parcel\n"
-        "outcome = perform_parcel(*pickle.load(open(sys.argv[1], 'rb')))\n"
-        "sys.stdout.buffer.write(outcome.runs.metrics.tobytes())\n"
-        "assert not any('springline_user' in name for name in sys.modules)\n"
-    )
-    there = subprocess.run([sys.executable, "-c", program, folder / "parcel"], check=True, capture_output=True).stdout
-    metrics = np.frombuffer(there).reshape(4, 2, -1)
-    part = parquet.read_table(dataset / "part-000000.parquet")
-    np.testing.assert_array_equal(metrics[:, 0, 0], part["response_time_lift"].to_numpy())
-    assert np.isfinite(metrics[:, 0, 5]).all()

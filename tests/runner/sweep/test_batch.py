@@ -27,26 +27,32 @@ from pyarrow import parquet
 from scipy.stats import spearmanr
 from typer.testing import CliRunner
 
-from springline.codegen.kernel.toolchain import ToolchainError
+from springline.codegen.kernel import ToolchainError
 from springline.runner import batch, load_scenario, simulate
 from springline.runner.cli import app
-from springline.runner.cli.amounts import size_text, time_text
-from springline.runner.cli.commands.batch import _progress
-from springline.runner.files.errors import InputError
-from springline.runner.files.storage import parquet_bytes
-from springline.runner.run.columns import trajectory_schema
-from springline.runner.scenario.locate import packaged_sweeps
-from springline.runner.sweep.dataset import Dataset, read_dataset
-from springline.runner.sweep.figures import rank_correlation, summary_figures
-from springline.runner.sweep.forecast import dataset_bytes, estimate
-from springline.runner.sweep.places import Folder, place
-from springline.runner.sweep.plan import Plan
-from springline.runner.sweep.pool import Cluster, Threads, open_pool
+from springline.runner.files import InputError, parquet_bytes
+from springline.runner.run import trajectory_schema
+from springline.runner.scenario import packaged_sweeps
+from springline.runner.sweep import (
+    Dataset,
+    Plan,
+    estimate,
+    load_sweep,
+    open_pool,
+    place,
+    read_dataset,
+    run_sweep,
+    stored_plan,
+    summarize,
+    summary_figures,
+    versions,
+)
+from springline.runner.sweep.figures import rank_correlation
+from springline.runner.sweep.forecast import dataset_bytes
+from springline.runner.sweep.places import Folder
+from springline.runner.sweep.pool import Cluster, Threads
 from springline.runner.sweep.quantiles import Quantiles
-from springline.runner.sweep.replay import stored_plan
-from springline.runner.sweep.running import Tally, run_sweep, versions
-from springline.runner.sweep.summary import QUANTILES, summarize
-from springline.runner.sweep.sweep import load_sweep
+from springline.runner.sweep.summary import QUANTILES
 from springline.runner.sweep.work import parcel, perform_parcel
 
 # Steps that cost next to nothing; one kernel for most tests of this file and of test_dataset.py.
@@ -556,25 +562,6 @@ def test_the_size_of_a_dataset_counts_the_trajectories_of_every_group(sweep: Pat
     assert sizes[1] == sizes[2] > 5 * sizes[0]
 
 
-@pytest.mark.parametrize("quiet", [False, True])
-def test_who_sees_no_bar_gets_a_line_every_ten_seconds(
-    sweep: Path, capsys: pytest.CaptureFixture[str], *, quiet: bool
-) -> None:
-    now = [100.0]
-    plan = Plan(load_sweep(sweep))  # 300 runs of 20 steps
-    with _progress(plan, quiet=quiet, clock=lambda: now[0]) as report:
-        tally = Tally(300, found=60)
-        for second in range(1, 32):
-            now[0] = 100.0 + second
-            tally.done = 4 * second
-            report(tally, 20 * 4 * second)
-    said = capsys.readouterr()
-    assert said.out == ""
-    lines = said.err.splitlines()
-    assert [line.split(" · ")[2] for line in lines] == ["100 done", "140 done", "180 done"]
-    assert lines[0] == (f"{sweep}: 33 % of 300 runs · 4 runs/s · 100 done · 0 failed · 0 diverged · 50 s left")
-
-
 @pytest.mark.parametrize(
     ("head", "expected"),
     [
@@ -781,18 +768,6 @@ def test_rank_correlation_is_spearmans_within_groups() -> None:
     shifted = np.repeat([0.0, 1000.0], 250)
     assert rank_correlation(x + shifted, x - shifted, np.repeat([0, 1], 250)) == pytest.approx(1.0)
     assert np.isnan(rank_correlation(x, np.ones(500), group))
-
-
-def test_sizes_and_times_are_for_people() -> None:
-    assert [time_text(s) for s in (0.0072, 0.123, 40, 600, 20_000, 400_000)] == [
-        "7.2 ms",
-        "0.12 s",
-        "40 s",
-        "10 min",
-        "5.6 h",
-        "4.6 days",
-    ]
-    assert [size_text(b) for b in (12, 34_567, 5.6e9, 7e13)] == ["12 B", "34.6 kB", "5.6 GB", "70 TB"]
 
 
 def test_a_batch_beyond_memory_is_refused_before_it_starts(monkeypatch: pytest.MonkeyPatch) -> None:

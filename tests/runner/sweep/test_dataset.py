@@ -23,23 +23,25 @@ import pytest
 from pyarrow import parquet
 from typer.testing import CliRunner
 
-from springline.codegen.files import atomic
-from springline.codegen.files.atomic import TEMPORARY
-from springline.codegen.kernel import lanes
-from springline.codegen.kernel.source import runtime_sources
+from springline.codegen.files import TEMPORARY, atomic
+from springline.codegen.kernel import lanes, runtime_sources
 from springline.runner.cli import app
 from springline.runner.cli.commands.batch import batch, replay
-from springline.runner.files.errors import InputError
-from springline.runner.scenario.scenario import load_scenario
-from springline.runner.sweep import work
+from springline.runner.files import InputError
+from springline.runner.scenario import load_scenario
+from springline.runner.sweep import (
+    Dataset,
+    Plan,
+    load_sweep,
+    open_pool,
+    place,
+    read_dataset,
+    run_sweep,
+    stored_plan,
+    versions,
+    work,
+)
 from springline.runner.sweep.changes import changes
-from springline.runner.sweep.dataset import Dataset, read_dataset
-from springline.runner.sweep.places import place
-from springline.runner.sweep.plan import Plan
-from springline.runner.sweep.pool import open_pool
-from springline.runner.sweep.replay import stored_plan
-from springline.runner.sweep.running import run_sweep, versions
-from springline.runner.sweep.sweep import load_sweep
 
 SWEEP = """
 scenario = "paper/nominal"

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import special, stats
 
-from springline.runner.files.errors import InputError
-from springline.runner.scenario.locate import packaged_sweeps
-from springline.runner.sweep import sampling
-from springline.runner.sweep.plan import MOST_GROUPS, Plan
-from springline.runner.sweep.sweep import load_sweep, sweep_from_json
+from springline.runner.files import InputError
+from springline.runner.scenario import packaged_sweeps
+from springline.runner.sweep import Plan, load_sweep, sampling
+from springline.runner.sweep.plan import MOST_GROUPS
+from springline.runner.sweep.sweep import sweep_from_json
 
 Write = Callable[..., Path]
 

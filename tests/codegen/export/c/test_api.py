@@ -13,16 +13,15 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from springline.codegen.export.bound import MODEL_FUNCTIONS, bind
-from springline.codegen.export.c import baking
+from springline.codegen.export import bind
+from springline.codegen.export.bound import MODEL_FUNCTIONS
+from springline.codegen.export.c import baking, generate_files
 from springline.codegen.export.c.baking import UnexpectedCode, print_baked, split_parameters
-from springline.codegen.export.c.tree import generate_files
-from springline.codegen.files.canonical import canonical_json
-from springline.codegen.files.manifest import check_tree, summary
+from springline.codegen.files import canonical_json, check_tree, summary
 from springline.codegen.kernel import toolchain
 from springline.runner import load_scenario
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[4]
 SCENARIO = load_scenario("paper/nominal")
 STRUCTURE, VALUES = SCENARIO.structure(), SCENARIO.values()
 SLOTS = SCENARIO.system().slots

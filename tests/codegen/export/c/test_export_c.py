@@ -16,14 +16,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springline.codegen.export.bound import bind
-from springline.codegen.export.c import interface
+from springline.codegen.export import bind
+from springline.codegen.export.c import generate_files, interface
 from springline.codegen.export.c.interface import STATUS
-from springline.codegen.export.c.tree import generate_files
-from springline.codegen.files.manifest import write_tree
-from springline.codegen.kernel.compiled import kernel
-from springline.codegen.kernel.settings import LoopSettings
-from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.codegen.files import write_tree
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.model.parameters import Slot
 from springline.model.quantities import BASE, REFERENCE, SATURATED, SIGMA, E, U, entries
 from springline.runner import load_scenario
@@ -869,7 +866,7 @@ def test_the_delays_that_the_documents_promise_survive_and_the_next_ones_do_not(
     (tmp_path / "delayed.c").write_text(_DELAYED)
     units = [folder / "src" / f"{prefix}.c", tmp_path / "delayed.c"]
     program = compile_c("cc", units, tmp_path / "delayed", *FLAGS)
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[4]
     survived: dict[int, int] = {}
     for document in (root / "docs" / "embedding.md", folder / "README.md"):
         text = document.read_text()

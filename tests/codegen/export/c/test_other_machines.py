@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from springline.codegen.export.bound import bind
-from springline.codegen.export.c.tree import generate_files
-from springline.codegen.files.manifest import write_tree
+from springline.codegen.export import bind
+from springline.codegen.export.c import generate_files
+from springline.codegen.files import write_tree
 from springline.runner import load_scenario
 
 STRICT = [

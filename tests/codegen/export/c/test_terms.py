@@ -11,10 +11,10 @@ import casadi as ca
 import pytest
 
 from springline.codegen.export import bind
-from springline.codegen.export.c.tree import generate_files
+from springline.codegen.export.c import generate_files
 from springline.codegen.kernel import toolchain
 from springline.model import Law, Parameter, Structure, System
-from springline.model.control import reaching
+from springline.model.control import LAWS
 from springline.model.parameters import Values
 from springline.model.terms import Term, named, noted, of_joint, section
 from springline.runner.scenario import load_scenario
@@ -121,7 +121,7 @@ def test_an_own_law_is_named_as_its_class_says(monkeypatch: pytest.MonkeyPatch) 
             root = named("root", ca.sqrt(sigma**2 + p.width**2))
             return -30 * sigma / root
 
-    monkeypatch.setitem(reaching.LAWS, "soft", Soft())
+    monkeypatch.setitem(LAWS, "soft", Soft())
     files, _ = generate_files(bind(*of_law("soft")))
     text = files["src/springline.c"].decode()
     assert "/* reaching law: soft sign, (7) of somebody, limit E4 */" in text
@@ -138,7 +138,7 @@ def test_a_name_that_is_another_s_gives_way(monkeypatch: pytest.MonkeyPatch, tmp
         def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
             return -30 * named(name, ca.tanh(sigma) / (1 + sigma**2))
 
-    monkeypatch.setitem(reaching.LAWS, "colliding", Colliding())
+    monkeypatch.setitem(LAWS, "colliding", Colliding())
     monkeypatch.setattr(Term, "labels", lambda term, joints: [term.name] * term.value.numel())
     files, _ = generate_files(bind(*of_law("colliding")))
     for path, content in files.items():

@@ -12,13 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen.export.fmu.archive import fmu
-from springline.codegen.export.fmu.settings import Settings
-from springline.codegen.kernel.compiled import kernel
-from springline.codegen.kernel.settings import LoopSettings
-from springline.codegen.kernel.spec import KernelOptions, KernelSpec
-from springline.codegen.program.frozen import Program
-from springline.codegen.program.tables import SignalTable
+from springline.codegen.export.fmu import Settings, fmu
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
+from springline.codegen.program import Program, SignalTable
 from springline.model.base import COORDINATES
 
 STEP, PERIOD, DURATION = 1e-4, 1e-3, 0.3

@@ -40,12 +40,10 @@ from fmi_client import (
 )
 from numpy.typing import NDArray
 
-from springline.codegen.export.fmu.archive import fmu
-from springline.codegen.export.fmu.settings import Settings
+from springline.codegen.export.fmu import Settings, fmu
 from springline.codegen.export.fmu.units import base_exponents
 from springline.codegen.kernel import toolchain
-from springline.codegen.program.frozen import Program, program
-from springline.codegen.program.tables import SignalTable
+from springline.codegen.program import Program, SignalTable, program
 from springline.model.structure import SignalShape, Structure
 
 # --- what is in the file ---------------------------------------------------------------------------------

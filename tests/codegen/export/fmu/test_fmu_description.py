@@ -10,7 +10,7 @@ import fmi_reader
 import pytest
 from fmi_client import CONTINUOUS, SAMPLED, Build, Values, client_library
 
-from springline.codegen.program.frozen import Program
+from springline.codegen.program import Program
 
 
 def described(path: Path, name: str = "modelDescription.xml") -> bytes:

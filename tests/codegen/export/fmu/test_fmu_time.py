@@ -28,9 +28,8 @@ from fmi_client import (
 )
 from numpy.typing import NDArray
 
-from springline.codegen.export.fmu.archive import fmu
-from springline.codegen.program.frozen import Program, program
-from springline.codegen.program.tables import SignalTable
+from springline.codegen.export.fmu import fmu
+from springline.codegen.program import Program, SignalTable, program
 from springline.model.structure import SignalShape, Structure
 
 UNIX = 1.7e9  # s; doubles there are 2.4e-7 s apart

@@ -1,0 +1,29 @@
+"""Structures and numbers of any arm on a base that moves, for tests of the generated code."""
+
+from typing import Any
+
+import numpy as np
+
+from springline.codegen.program import program
+from springline.model.mechanisms import MECHANISMS
+from springline.model.structure import SignalShape, Structure
+
+
+def structure_of(mechanism: str, **changes: Any) -> Structure:
+    arm = MECHANISMS[mechanism]
+    terms = tuple(len(t) for t in arm.reference_terms)
+    given = {"reference": SignalShape("sine", terms), "base_motion": SignalShape("sine", (1, 1, 1))} | changes
+    return Structure(mechanism=mechanism, **given)
+
+
+def values_of(structure: Structure) -> np.ndarray:
+    """The mechanism's own reference and start, under a base that moves; U_max low enough to limit now and then."""
+    arm = MECHANISMS[structure.mechanism]
+    given = {"base_motion.shake.0.amplitude": 0.1, "base_motion.shake.0.omega": 9.0,
+             "base_motion.pitch.0.amplitude": 0.05, "base_motion.pitch.0.omega": 3.0}  # fmt: skip
+    for i, joint in enumerate(arm.joints):
+        given |= {f"initial.q.{i}": arm.start_position[i], f"reference.{joint.name}.offset": arm.reference_offset[i]}
+        for k, term in enumerate(arm.reference_terms[i]):
+            stem = f"reference.{joint.name}.terms.{k}"
+            given |= {f"{stem}.amplitude": term.amplitude, f"{stem}.omega": term.omega, f"{stem}.phase": term.phase}
+    return np.array([given.get(slot.key, slot.default) for slot in program(structure).system.slots])
