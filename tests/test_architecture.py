@@ -31,6 +31,14 @@ STRANGERS = {
 }
 """What is not of the standard library and may be imported, where that is not everything."""
 
+PAST_THE_DOOR = {
+    "codegen/test_one_loop.py": {"codegen.export.fmu"},  # has FMUs compiled without optimisation
+    "runner/conftest.py": {"codegen.kernel", "codegen.export.c"},  # saves work that other tests look at
+    "runner/cli/test_cli.py": {"runner.paper"},  # makes up what a reproduction returns
+    "runner/sweep/test_dataset.py": {"codegen.files", "runner.cli"},  # fills a disk; calls a command, to kill it
+}
+"""Tests that need internals of another room than their own."""
+
 
 class Import(NamedTuple):
     """`name` is imported from `module` by a line of a file."""
@@ -110,7 +118,13 @@ def target(found: Import) -> str:
     return home(module, found.name) if folder(module).is_dir() else module
 
 
+def mirrored(test: Path) -> str:
+    """The room, or package, that the folder of a test is named after."""
+    return ".".join(test.parent.relative_to(ROOT / "tests").parts)
+
+
 ALL = [found for package in PACKAGES for path in sources(package) for found in imports(path)]
+TESTS = [found for path in sorted((ROOT / "tests").rglob("*.py")) for found in imports(path)]
 
 
 def test_packages_import_downwards() -> None:
@@ -135,12 +149,38 @@ def test_what_is_below_knows_little_of_the_world(package: str) -> None:
         assert set(strangers(path)) <= allowed, path
 
 
+def past_the_door(found: Import) -> str:
+    """The room that is entered by another way than its door, "" if there is none."""
+    module = found.module.removeprefix("springline").removeprefix(".")
+    if not module or module in PACKAGES:  # whose own files are no room's
+        return ""
+    if (folder(module) / "__init__.pyi").exists():
+        shown = (folder(module) / found.name).is_dir() or found.name in {name for _, name in listed(module)}
+        return "" if shown else module
+    return "" if room_of(module) == module else room_of(module)
+
+
 def test_a_room_is_entered_by_its_door() -> None:
-    """What is outside of a folder imports from the folder, not from a file in it."""
+    """What is outside of a folder imports what its door lists, and nothing from a file in it."""
     for found in ALL:
-        module = found.module.removeprefix("springline.")
-        inside = room_of(module_of(found.file)) == room_of(module)
-        assert inside or folder(module).is_dir() or room_of(module) == module, str(found)
+        assert past_the_door(found) in ("", room_of(module_of(found.file))), str(found)
+
+
+def test_tests_of_a_rooms_internals_stand_in_its_folder() -> None:
+    """tests/ mirrors the rooms: whoever does not stand in a room's folder there enters the room by its door."""
+    needed: dict[str, set[str]] = {}
+    for found in TESTS:
+        room, own = past_the_door(found), mirrored(found.file)
+        if room and not f"{own}.".startswith(f"{room}."):
+            name = found.file.relative_to(ROOT / "tests").as_posix()
+            assert room in PAST_THE_DOOR.get(name, set()), str(found)
+            needed.setdefault(name, set()).add(room)
+    assert needed == PAST_THE_DOOR
+
+
+def test_every_folder_of_tests_mirrors_one_of_ours() -> None:
+    for path in (ROOT / "tests").rglob("test_*.py"):
+        assert folder(mirrored(path)).is_dir(), path
 
 
 def test_no_circle_of_files() -> None:
@@ -181,11 +221,11 @@ def test_a_door_shows_its_public_names_alone(room: str) -> None:
 
 
 def test_every_name_of_a_door_is_wanted_outside() -> None:
-    """A door is no list of all there is: what nobody else imports is a room's own affair."""
+    """A door is no list of all there is: what nobody else imports, its own tests aside, is a room's own affair."""
     public = {"springline", "model", "runner", "runner.cli"}
-    tests = [found for path in sorted((ROOT / "tests").rglob("*.py")) for found in imports(path)]
     docs = "\n".join(path.read_text("utf-8") for path in [*(ROOT / "docs").glob("*.md"), ROOT / "README.md"])
-    wanted = {(found.module, found.name) for found in [*ALL, *tests]}
+    strange = [found for found in TESTS if not f"springline.{mirrored(found.file)}.".startswith(f"{found.module}.")]
+    wanted = {(found.module, found.name) for found in [*ALL, *strange]}
     wanted |= {(f"springline.{room}.{file}", name) for room in public - {"springline"} for file, name in listed(room)}
     for room in set(doors()) - public:
         for name in dir(importlib.import_module(f"springline.{room}")):
