@@ -1,4 +1,4 @@
-"""From C sources to a loaded shared library: find a compiler, build once, keep the result by content.
+"""From C sources to a loaded shared library: built once, kept by content.
 
 The cache key holds everything that decides the machine code: sources, flags, and every macro the compiler
 predefines under those flags. The macros name compiler version, target, C library and, with ``-march=native``,
@@ -9,9 +9,7 @@ import contextlib
 import ctypes
 import errno
 import fcntl
-import functools
 import hashlib
-import importlib.util
 import json
 import os
 import shlex
@@ -21,170 +19,16 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Literal, NamedTuple
 
-Family = Literal["gcc", "clang", "zig"]
+from springline.codegen.kernel.toolchain.compiler import Compiler, find_compiler, predefined_macros, run_compiler
+from springline.codegen.kernel.toolchain.errors import ANOTHER_FOLDER, ToolchainError, cache_root
 
 BASE_FLAGS = ("-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Werror")
 """Flags of every build. No contraction, or bits depend on the machine; errno would make sqrt a call."""
 
 _LIBRARY = "library.so"
 _CHECKSUM = "library.sha256"
-_STDERR_LINES = 12
-_NO_COMPILER = (
-    "no C compiler found: install one from your system (Debian, Ubuntu: apt-get install gcc libc6-dev; "
-    "Fedora: dnf install gcc; macOS: xcode-select --install) or run: pip install 'springline[compiler]'"
-)
-
-
-_ANOTHER_FOLDER = "set SPRINGLINE_CACHE to a folder of yours that can be written to"
-
-
-class ToolchainError(RuntimeError):
-    """No compiler, a failed build or an unusable cache; the message says what to do about it."""
-
-
-@dataclass(frozen=True)
-class Compiler:
-    """A C compiler that has been seen to preprocess ``#include <math.h>``.
-
-    argv     how it is called; the first entry is an absolute path
-    family   whose command line and diagnostics it follows
-    version  as the compiler names itself, for example ``12.2.0``
-    target   machine triple, for example ``x86_64-linux-gnu``
-    """
-
-    argv: tuple[str, ...]
-    family: Family
-    version: str
-    target: str
-
-
-class Check(NamedTuple):
-    """One row of ``springline doctor``."""
-
-    name: str
-    value: str
-    ok: bool
-
-
-# --- finding a compiler ----------------------------------------------------------------------------------
-
-
-def find_compiler() -> Compiler:
-    """The compiler to use: $CC (arguments allowed), else the first that works of cc, gcc, clang, ziglang.
-
-    Raises ToolchainError if $CC is set but does not work, or if there is none at all.
-    """
-    return _find_compiler(os.environ.get("CC", "").strip(), os.environ.get("PATH", os.defpath))
-
-
-@functools.cache
-def _find_compiler(cc: str, path: str) -> Compiler:
-    # `path` is a cache key only: after a change of $PATH the search starts again.
-    if cc:
-        try:
-            words = shlex.split(cc)
-        except ValueError as error:  # a quotation mark that is not closed
-            raise ToolchainError(
-                f"the environment variable CC is {cc!r}, which is no command line ({error}): correct or unset it"
-            ) from error
-        compiler = probe_compiler(words)
-        if compiler is None:
-            raise ToolchainError(
-                f"the environment variable CC is {cc!r}, which is no working C compiler: correct or unset it"
-            )
-        return compiler
-    candidates = [["cc"], ["gcc"], ["clang"]]
-    if importlib.util.find_spec("ziglang") is not None:
-        candidates.append([sys.executable, "-m", "ziglang", "cc"])
-    for argv in candidates:
-        compiler = probe_compiler(argv)
-        if compiler is not None:
-            return compiler
-    raise ToolchainError(_NO_COMPILER)
-
-
-def probe_compiler(argv: Sequence[str]) -> Compiler | None:
-    """The compiler called by `argv`; None where there is none or it does not find the C library's headers."""
-    program = shutil.which(argv[0]) if argv else None
-    if program is None:
-        return None
-    call = (os.path.abspath(program), *argv[1:])
-    try:
-        macros = _preprocess(call, ())
-        target = _call([*call, "-dumpmachine"]).stdout.strip()
-    except ToolchainError:
-        return None
-    if _is_zig(call):
-        family: Family = "zig"
-    else:
-        family = "clang" if "__clang__" in macros else "gcc"
-    return Compiler(call, family, macros.get("__VERSION__", "unknown").strip('" '), target)
-
-
-def _is_zig(argv: Sequence[str]) -> bool:
-    return "ziglang" in argv or Path(argv[0]).name.startswith("zig")
-
-
-def predefined_macros(compiler: Compiler, flags: Sequence[str] = ()) -> Mapping[str, str]:
-    """Every macro that `compiler` defines under `flags`, ``<math.h>`` and so the C library's included.
-
-    Raises ToolchainError if the compiler refuses the flags.
-    """
-    return _cached_macros(compiler, tuple(flags))
-
-
-@functools.cache
-def _cached_macros(compiler: Compiler, flags: tuple[str, ...]) -> Mapping[str, str]:
-    return _preprocess(compiler.argv, flags)
-
-
-def _preprocess(argv: Sequence[str], flags: Sequence[str]) -> Mapping[str, str]:
-    done = _call([*argv, *flags, "-dM", "-E", "-x", "c", "-"], stdin="#include <math.h>\n")
-    definitions = (line.split(maxsplit=2) for line in done.stdout.splitlines() if line.startswith("#define "))
-    return {words[1]: words[2] if len(words) == 3 else "" for words in definitions}
-
-
-@functools.cache
-def native_flags(compiler: Compiler) -> tuple[str, ...]:
-    """The flags that let `compiler` use all of this machine's CPU; none where it knows no such flag."""
-    for flag in ("-march=native", "-mcpu=native"):
-        with contextlib.suppress(ToolchainError):  # refused: the other spelling, or the baseline
-            predefined_macros(compiler, (flag,))
-            return (flag,)
-    return ()
-
-
-def native_vector_width(compiler: Compiler | None = None) -> int:
-    """How many doubles a vector register of this machine holds: 8 (AVX-512F), 4 (AVX) or 2."""
-    compiler = compiler or find_compiler()
-    macros = predefined_macros(compiler, native_flags(compiler))
-    if "__AVX512F__" in macros:
-        return 8
-    return 4 if "__AVX__" in macros else 2
-
-
-# --- building --------------------------------------------------------------------------------------------
-
-
-def cache_root() -> Path:
-    """$SPRINGLINE_CACHE, else $XDG_CACHE_HOME/springline, else ~/.cache/springline.
-
-    Raises ToolchainError where none of them is set and the user has no home.
-    """
-    own = os.environ.get("SPRINGLINE_CACHE")
-    if own:
-        return Path(own).absolute()
-    shared = os.environ.get("XDG_CACHE_HOME")
-    try:
-        return (Path(shared) if shared else Path.home() / ".cache").absolute() / "springline"
-    except RuntimeError as error:  # no HOME, and the user database does not know this user
-        raise ToolchainError(
-            f"no folder for compiled libraries: you have no home here ({error}); {_ANOTHER_FOLDER}"
-        ) from error
 
 
 def build_library(
@@ -229,9 +73,9 @@ def build_library(
             if not (_intact(entry) and _loads(library)):
                 _build(entry, content, command, compiler)
     except OSError as error:
-        remedy = _ANOTHER_FOLDER
+        remedy = ANOTHER_FOLDER
         if error.errno in (errno.EISDIR, errno.ENOTDIR, errno.ELOOP):
-            remedy = f"remove what stands in its place, rm -r {shlex.quote(str(entry))}, or {_ANOTHER_FOLDER}"
+            remedy = f"remove what stands in its place, rm -r {shlex.quote(str(entry))}, or {ANOTHER_FOLDER}"
         raise ToolchainError(f"cannot use the cache folder {root} ({error}): {remedy}") from error
     return library
 
@@ -257,13 +101,13 @@ def _expect_trusted(root: Path, entry: Path) -> None:
         if found.st_uid not in (me, 0):
             raise ToolchainError(
                 f"the cache would run the code of another user: {place} belongs to user {found.st_uid}, and you are "
-                f"user {me}; {_ANOTHER_FOLDER}"
+                f"user {me}; {ANOTHER_FOLDER}"
             )
         if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
             raise ToolchainError(
                 f"the cache would run what others may have written: {place} has mode "
                 f"{stat.S_IMODE(found.st_mode):04o}; take their right away, chmod -R go-w {shlex.quote(str(root))}, "
-                f"or {_ANOTHER_FOLDER}"
+                f"or {ANOTHER_FOLDER}"
             )
 
 
@@ -357,7 +201,7 @@ def _build(entry: Path, content: Mapping[str, bytes], command: Sequence[str], co
         for name, text in content.items():
             (work / name).parent.mkdir(parents=True, exist_ok=True)
             (work / name).write_bytes(text)
-        _call([*command, f"-ffile-prefix-map={work}=."], cwd=work)
+        run_compiler([*command, f"-ffile-prefix-map={work}=."], cwd=work)
         library = work / _LIBRARY
         _expect_loadable(library, compiler)
         checksum = work / _CHECKSUM
@@ -406,62 +250,3 @@ def _machine(image: Path) -> bytes:
     with image.open("rb") as stream:
         header = stream.read(20)
     return header[4:6] + header[18:20] if len(header) == 20 and header.startswith(b"\x7fELF") else b""
-
-
-def _call(argv: Sequence[str], *, cwd: Path | None = None, stdin: str = "") -> subprocess.CompletedProcess[str]:
-    """Run a compiler. Raises ToolchainError with the command and the first lines of its messages."""
-    environment = dict(os.environ, LC_ALL="C")
-    if _is_zig(argv):
-        environment.setdefault("ZIG_GLOBAL_CACHE_DIR", str(cache_root() / "zig"))
-    try:
-        done = subprocess.run(
-            argv,
-            check=False,
-            cwd=cwd,
-            input=stdin,
-            env=environment,
-            capture_output=True,
-            text=True,
-            errors="replace",
-        )
-    except OSError as error:
-        raise ToolchainError(f"cannot run {shlex.join(argv)}: {error}") from error
-    if done.returncode != 0:
-        lines = (done.stderr.strip() or "(it printed no message)").splitlines()
-        if len(lines) > _STDERR_LINES:
-            lines[_STDERR_LINES:] = [f"... and {len(lines) - _STDERR_LINES} more lines"]
-        raise ToolchainError("\n  ".join(["the compiler failed:", shlex.join(argv), *lines]))
-    return done
-
-
-# --- springline doctor -----------------------------------------------------------------------------------
-
-
-def checks() -> list[Check]:
-    """The state of the toolchain: compiler, vector width, cache, and whether a library builds and loads."""
-    try:
-        cache = Check("cache", str(cache_root()), True)
-    except ToolchainError as error:
-        cache = Check("cache", str(error), False)
-    try:
-        compiler = find_compiler()
-    except ToolchainError as error:
-        return [Check("C compiler", str(error), False), cache]
-    rows = [
-        Check("C compiler", shlex.join(compiler.argv), True),
-        Check("compiler version", f"{compiler.family} {compiler.version}", True),
-        Check("target", compiler.target, True),
-        Check("native flags", shlex.join(native_flags(compiler)) or "(none)", True),
-        Check("vector width", f"{native_vector_width(compiler)} doubles", True),
-        cache,
-    ]
-    if not cache.ok:
-        return rows
-    source = "int springline_probe(int x);\nint springline_probe(int x) { return x + 1; }\n"
-    try:
-        library = load(build_library({"probe.c": source}, main="probe.c", compiler=compiler))
-        works = library.springline_probe(41) == 42
-        rows.append(Check("build and load", "works" if works else "the library gave a wrong sum", works))
-    except ToolchainError as error:
-        rows.append(Check("build and load", str(error), False))
-    return rows

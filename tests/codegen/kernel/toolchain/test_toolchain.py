@@ -17,18 +17,18 @@ from typing import NamedTuple
 
 import pytest
 
-from springline.codegen.kernel import ToolchainError, checks, toolchain
+from springline.codegen.kernel import ToolchainError, checks
 from springline.codegen.kernel.toolchain import (
     Compiler,
     build_library,
-    cache_root,
     find_compiler,
     load,
     native_flags,
     native_vector_width,
-    predefined_macros,
     probe_compiler,
 )
+from springline.codegen.kernel.toolchain.compiler import _find_compiler, predefined_macros
+from springline.codegen.kernel.toolchain.errors import cache_root
 
 SOURCES = {
     "main.c": '#include "inner/value.h"\nint value(void);\nint value(void) { return VALUE; }\n',
@@ -128,9 +128,9 @@ def test_ziglang_is_the_last_resort(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv("PYTHONPATH", str(package.parent))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr("shutil.which", lambda name: name if name == sys.executable else None)
-    toolchain._find_compiler.cache_clear()
+    _find_compiler.cache_clear()
     compiler = find_compiler()
-    toolchain._find_compiler.cache_clear()
+    _find_compiler.cache_clear()
     assert compiler.family == "zig"
     assert compiler.argv == (sys.executable, "-m", "ziglang", "cc")
     assert load(build_library(SOURCES, main="main.c", compiler=compiler)).value() == 7

@@ -1,0 +1,5 @@
+"""The toolchain: from C sources to a loaded library."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

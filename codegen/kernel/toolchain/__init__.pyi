@@ -1,0 +1,10 @@
+from .cache import build_library as build_library
+from .cache import load as load
+from .compiler import Compiler as Compiler
+from .compiler import find_compiler as find_compiler
+from .compiler import native_flags as native_flags
+from .compiler import native_vector_width as native_vector_width
+from .compiler import probe_compiler as probe_compiler
+from .doctor import Check as Check
+from .doctor import checks as checks
+from .errors import ToolchainError as ToolchainError
