@@ -47,8 +47,8 @@ from springline.runner.sweep import (
     summary_figures,
     versions,
 )
-from springline.runner.sweep.figures import rank_correlation
 from springline.runner.sweep.forecast import dataset_bytes
+from springline.runner.sweep.influence import rank_correlation
 from springline.runner.sweep.places import Folder
 from springline.runner.sweep.pool import Cluster, Threads
 from springline.runner.sweep.quantiles import Quantiles
