@@ -12,7 +12,6 @@ from .scenario import Slots as Slots
 from .scenario import draft_scenario as draft_scenario
 from .scenario import expect_scenario as expect_scenario
 from .scenario import load_scenario as load_scenario
-from .scenario import parse_set as parse_set
 from .scenario import per_run as per_run
 from .schema import DOORS as DOORS
 from .schema import DOOR_KEYS as DOOR_KEYS

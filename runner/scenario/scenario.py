@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -36,7 +34,6 @@ from springline.runner.scenario.user_code import UserClass, canonical_reference,
 Floats = NDArray[np.float64]
 # Relative to the largest eigenvalue: a mass matrix below this is singular to the precision of what is computed with it.
 _SINGULAR = 1e-12
-_BARE_WORD = re.compile(r"([^\W\d]|\.{0,2}/)[\w.:/+-]*")
 
 Slots = dict[str, float | Floats]
 """Slot key -> one number for all runs, or a column (runs,) of them."""
@@ -442,30 +439,6 @@ def expect_scenario(given: object) -> None:
     if not isinstance(given, Scenario):
         remedy = f": load_scenario({str(given)!r}) gives one" if isinstance(given, str | PathLike) else ""
         raise TypeError(f"expected a Scenario, got {shortened(repr(given))}{remedy}")
-
-
-def parse_set(text: str, source: str) -> tuple[str, object]:
-    """KEY=TOMLVALUE as a key and a value: "control.delta=0.02", "control.law=power", "plant.m3={ scale = 1.2 }".
-
-    What is no TOML value but a bare word, or a path, is text: quotes inside a shell's quotes are a nuisance.
-    source  the scenario that it is to override, for messages
-    Raises InputError if it is not of that form.
-    """
-    where = _overridden(source)
-    key, equals, value = text.partition("=")
-    key = key.strip()
-    if not equals or not key:
-        raise InputError(Problem(where, "", "expected --set KEY=VALUE", schema.given_text(text)))
-    try:
-        parsed = read_toml(f"value = {value}")
-    except ValueError as error:
-        if isinstance(error, tomllib.TOMLDecodeError) and _BARE_WORD.fullmatch(value.strip()):
-            return key, value.strip()
-        hint = f"expected a TOML value ({error}); a text of several words needs quotes: --set '{key}=\"…\"'"
-        raise InputError(Problem(where, key, hint, value.strip())) from error
-    if set(parsed) != {"value"}:
-        raise InputError(Problem(where, key, "expected one TOML value", schema.given_text(value)))
-    return key, parsed["value"]
 
 
 def _overridden(source: str) -> str:

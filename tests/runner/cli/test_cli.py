@@ -30,11 +30,12 @@ from springline.codegen.kernel import kernel
 from springline.model.control import LAWS
 from springline.runner.cli import app, terminal
 from springline.runner.cli.commands import run as run_command
+from springline.runner.cli.options import parse_set
 from springline.runner.files import InputError, units
 from springline.runner.paper import reproduction
 from springline.runner.paper.evidence import Check, Finding
 from springline.runner.run import simulate
-from springline.runner.scenario import load_scenario, packaged_scenarios, packaged_sweeps, parse_set
+from springline.runner.scenario import load_scenario, packaged_scenarios, packaged_sweeps
 
 MAIN = "from springline.runner.cli import main; main()"
 FIGURES = {"tracking", "error", "force", "sliding", "springs", "steady_state", "base_motion"}
@@ -394,6 +395,20 @@ def test_a_bare_word_is_text_and_a_toml_value_is_what_it_is(text: str, value: ob
 def test_what_is_neither_a_toml_value_nor_a_word_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="expected"):
         parse_set(f"control.law={text}", "x.toml")
+
+
+def test_set_is_a_key_and_a_toml_value() -> None:
+    assert parse_set("control.delta=0.02", "s") == ("control.delta", 0.02)
+    assert parse_set(' control.law = "power"', "s") == ("control.law", "power")
+    assert parse_set("control.law=power", "s") == ("control.law", "power")
+    assert parse_set("plant.m3={ scale = 1.2 }", "s") == ("plant.m3", {"scale": 1.2})
+    assert parse_set("control.U_max=[inf, 3]", "s") == ("control.U_max", [math.inf, 3])
+
+
+@pytest.mark.parametrize("text", ["control.delta", "=3", "control.law=double power", "a=1\nb=2", "a="])
+def test_what_is_no_set_is_told(text: str) -> None:
+    with pytest.raises(InputError, match=r"^override of paper/nominal: .*expected"):
+        parse_set(text, "paper/nominal")
 
 
 # --- what reaches the terminal ---------------------------------------------------------------------------

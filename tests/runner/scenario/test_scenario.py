@@ -19,7 +19,7 @@ from springline.model.control import LAWS
 from springline.model.parameters import Bounds
 from springline.model.structure import SignalShape, Structure
 from springline.runner.files import InputError, value_text
-from springline.runner.scenario import Scenario, kernel_tables, load_scenario, packaged_scenarios, parse_set
+from springline.runner.scenario import Scenario, kernel_tables, load_scenario, packaged_scenarios
 
 GROUPS = {
     "paper/group1_shake": {},
@@ -691,20 +691,6 @@ def test_mistakes_in_overrides_are_told(key: str, value: object, expected: list[
     message = told("", {key: value})
     assert message.startswith("override of ") and "s.toml" in message.partition(": ")[0]
     assert all(part in message for part in expected), message
-
-
-def test_set_is_a_key_and_a_toml_value() -> None:
-    assert parse_set("control.delta=0.02", "s") == ("control.delta", 0.02)
-    assert parse_set(' control.law = "power"', "s") == ("control.law", "power")
-    assert parse_set("control.law=power", "s") == ("control.law", "power")
-    assert parse_set("plant.m3={ scale = 1.2 }", "s") == ("plant.m3", {"scale": 1.2})
-    assert parse_set("control.U_max=[inf, 3]", "s") == ("control.U_max", [math.inf, 3])
-
-
-@pytest.mark.parametrize("text", ["control.delta", "=3", "control.law=double power", "a=1\nb=2", "a="])
-def test_what_is_no_set_is_told(text: str) -> None:
-    with pytest.raises(InputError, match=r"^override of paper/nominal: .*expected"):
-        parse_set(text, "paper/nominal")
 
 
 @pytest.mark.parametrize("overrides", ["control.delta=1", 5, [], [("control.delta", 1.0)], {1: 2.0}])
