@@ -21,8 +21,6 @@ from .running import run_sweep as run_sweep
 from .running import versions as versions
 from .summary import Summary as Summary
 from .summary import markdown as markdown
-from .summary import metric_rows as metric_rows
-from .summary import outcome_rows as outcome_rows
 from .summary import summarize as summarize
-from .summary import worst_rows as worst_rows
+from .summary import summary_tables as summary_tables
 from .sweep import load_sweep as load_sweep

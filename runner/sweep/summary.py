@@ -187,7 +187,12 @@ Rows = tuple[list[str], list[list[str]]]
 """Header and rows of a table of texts."""
 
 
-def outcome_rows(summary: Summary) -> Rows:
+def summary_tables(summary: Summary, keys: Sequence[str]) -> tuple[Rows, Rows, Rows]:
+    """How the runs of each group ended; quantiles of the metrics; the worst runs with these keys."""
+    return _outcome_rows(summary), _metric_rows(summary), _worst_rows(summary, keys)
+
+
+def _outcome_rows(summary: Summary) -> Rows:
     """How many runs of each group ended how."""
     header = ["group", "runs", "ok", "of these chattering", "diverged", "out of bounds", "stopped early"]
     rows = []
@@ -199,7 +204,7 @@ def outcome_rows(summary: Summary) -> Rows:
     return header, rows
 
 
-def metric_rows(summary: Summary) -> Rows:
+def _metric_rows(summary: Summary) -> Rows:
     """Quantiles of every metric, over the runs that have it."""
     names = {0.0: "least", 0.5: "median", 1.0: "largest"}
     header = ["metric", "unit", *(names.get(q, f"{q:.0%}") for q in QUANTILES), "none"]
@@ -215,7 +220,7 @@ def metric_rows(summary: Summary) -> Rows:
     return header, rows
 
 
-def worst_rows(summary: Summary, keys: Sequence[str]) -> Rows:
+def _worst_rows(summary: Summary, keys: Sequence[str]) -> Rows:
     """The worst runs with what varied and what came of it."""
     results = [name for name in summary.units if name.startswith(("settling_time_", "steady_state_error_"))]
     header = ["run", "status", "t_end", *keys, *results]
@@ -230,22 +235,21 @@ def _cell(value: object) -> str:
 
 def markdown(plan: Plan, summary: Summary, figures: Sequence[str], name: str) -> str:
     """summary.md: the tables, and the figures by file name."""
-    keys = [axis.key for axis in plan.sweep.axes]
+    outcomes, metrics, worst = summary_tables(summary, [axis.key for axis in plan.sweep.axes])
     varied = "\n".join(f"- `{axis.key}`: `{value_text(axis.as_toml())}`" for axis in plan.sweep.axes)
     sections = [
         f"# {name}",
         f"{summary.runs:,} of {plan.runs:,} runs of `{plan.sweep.scenario.source}` ({plan.sweep.method}, "
         f"seed {plan.sweep.seed}).\n\n{varied}",
         "## What became of the runs\n\n"
-        + _markdown_table(outcome_rows(summary))
+        + _markdown_table(outcomes)
         + f"\n\nA run chatters where `chatter_` of a joint is above {CHATTERING:g} 1/s: its command swings so often "
         "that its other metrics say little.",
         *(f"![{figure.rpartition('.')[0]}]({figure})" for figure in figures),
         "## Metrics\n\nQuantiles over the runs that have the metric; the last column is the share that has not.\n\n"
-        + _markdown_table(metric_rows(summary)),
+        + _markdown_table(metrics),
         "## The worst runs\n\nThose that stopped, the earliest first; then those with the largest steady-state error. "
-        "`springline replay` simulates one of them again with its trajectory.\n\n"
-        + _markdown_table(worst_rows(summary, keys)),
+        "`springline replay` simulates one of them again with its trajectory.\n\n" + _markdown_table(worst),
     ]
     return "\n\n".join(sections) + "\n"
 

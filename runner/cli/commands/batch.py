@@ -151,7 +151,7 @@ def _finish(
     plan: Plan, dataset: Dataset, done: set[int], tally: Tally, again: str, *, plot: bool, as_json: bool
 ) -> None:
     """Summary and last words; exits with 1 if something failed."""
-    from springline.runner.sweep import metric_rows, outcome_rows, summarize, worst_rows
+    from springline.runner.sweep import summarize, summary_tables
 
     problems = [f"failed: {failure}" for failure in tally.failures]
     if tally.found + tally.done:
@@ -166,7 +166,7 @@ def _finish(
         else:
             keys = [axis.key for axis in plan.sweep.axes]
             keys = keys if len(keys) <= _SHOWN_KEYS else []  # summary.md has room for all
-            for header, rows_of_text in (outcome_rows(summary), metric_rows(summary), worst_rows(summary, keys)):
+            for header, rows_of_text in summary_tables(summary, keys):
                 print_table(header, rows_of_text, right=header[1:])
     if problems:
         for problem in problems:
