@@ -59,6 +59,10 @@ class BaseMotion:
         """(g + acceleration of the shake) along the inertial Y, 3 x 1, m/s^2, base axes; [0, g, 0] at rest."""
         return self.rotation.T @ ca.vertcat(0, g + self.ddb[0], 0)
 
+    def rest_force(self, g: ca.SX) -> ca.SX:
+        """`specific_force` of a base at rest, 3 x 1, m/s^2, base axes: [0, g, 0]."""
+        return ca.vertcat(0, g, 0)
+
     def excess_force(self, g: ca.SX) -> ca.SX:
         """`specific_force` less [0, g, 0], 3 x 1, m/s^2, written so that a small excess keeps its digits."""
         level = ca.vertcat(0, 1, 0)

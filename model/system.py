@@ -33,7 +33,7 @@ from springline.model.control import (
 from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
 from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
-from springline.model.lagrange import EquationsOfMotion, equations_of_motion
+from springline.model.dynamics import EquationsOfMotion, equations_of_motion
 from springline.model.mechanisms import MECHANISMS, Mechanism
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
 from springline.model.quantities import (
@@ -386,7 +386,7 @@ class System:
 
     def _arm_energy(self) -> ca.SX:
         """Kinetic and potential energy of the arm with the base at rest, J."""
-        rest, up = ca.SX.zeros(3), ca.vertcat(0, self._plant.g, 0)
+        rest, up = ca.SX.zeros(3), self.base.rest_force(self._plant.g)
         moving = self.mechanism.kinetic_energy(self.q1, self.dq1, rest, self._plant)
         return moving + self.mechanism.potential_energy(self.q1, up, self._plant)
 
