@@ -51,6 +51,13 @@ class EquationsOfMotion:
     form: Form
     counted: Mapping[Form, int] = field(default_factory=dict)
 
+    @property
+    def told(self) -> str:
+        """Which form this is and why, a sentence for people."""
+        other: Form = "factored" if self.form == "normal" else "normal"
+        rival = f"{self.counted[other]} {other}" if other in self.counted else f"the {other} form explodes"
+        return f"equations of motion in {self.form} form: {self.counted[self.form]} operations ({rival})"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Terms:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from springline.model.mechanisms.body import Body, turning
+from springline.model.mechanisms.body import Solid, turning
 
 
-def mass_matrix(bodies: Sequence[Body], q: ca.SX) -> ca.SX:
+def mass_matrix(bodies: Sequence[Solid], q: ca.SX) -> ca.SX:
     """M(q), n x n."""
     mass = ca.SX.zeros(q.numel(), q.numel())
     for body in bodies:
@@ -22,7 +22,7 @@ def mass_matrix(bodies: Sequence[Body], q: ca.SX) -> ca.SX:
     return ca.densify(lower)
 
 
-def inverse_dynamics(bodies: Sequence[Body], q: ca.SX, dq: ca.SX, omega: ca.SX, alpha: ca.SX, force: ca.SX) -> ca.SX:
+def inverse_dynamics(bodies: Sequence[Solid], q: ca.SX, dq: ca.SX, omega: ca.SX, alpha: ca.SX, force: ca.SX) -> ca.SX:
     """Generalised forces that hold ddq at zero, n x 1.
 
     omega, alpha  of the base, 3 x 1, base axes;  force: specific force at its origin, m/s^2, base axes

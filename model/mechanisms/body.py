@@ -27,8 +27,19 @@ class Body:
     inertia: Any = 0.0
 
 
-def expressions_of(body: Body, owner: str, symbols: Sequence[ca.SX]) -> Body:
-    """The body with CasADi expressions of full shape in place of what the user wrote.
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """A body as expressions of full shape, checked; planar: whether its inertia was said as a scalar, about z alone."""
+
+    mass: ca.SX
+    position: ca.SX
+    rotation: ca.SX
+    inertia: ca.SX
+    planar: bool
+
+
+def solid(body: object, owner: str, symbols: Sequence[ca.SX]) -> Solid:
+    """What a user wrote as expressions.
 
     owner    for messages
     symbols  what it may depend on
@@ -36,29 +47,46 @@ def expressions_of(body: Body, owner: str, symbols: Sequence[ca.SX]) -> Body:
     """
     if not isinstance(body, Body):
         raise ValueError(f"{owner}: expected a Body, got {type(body).__name__}")
-
-    def matrix(what: str, value: object) -> ca.SX:
-        if isinstance(value, list | tuple):
-            value = ca.blockcat([list(row) for row in value])
-        if not isinstance(value, ca.SX | ca.DM) or value.shape != (3, 3):
-            shape = f"{value.shape[0]} x {value.shape[1]}" if isinstance(value, ca.SX | ca.DM) else repr(value)
-            raise ValueError(f"{owner}: {what}: expected 3 x 3, got {shape}")
-        column(owner, what, ca.densify(ca.vec(value)), 9, symbols)
-        return ca.densify(ca.SX(value))
-
-    position = ca.vertcat(*body.position) if isinstance(body.position, list | tuple) else body.position
-    inertia, rotation = body.inertia, body.rotation
-    if isinstance(inertia, int | float) or (isinstance(inertia, ca.SX | ca.DM) and inertia.numel() == 1):
-        inertia = ca.diag(ca.vertcat(0, 0, column(owner, "inertia", inertia, 1, symbols)))
-    return Body(
+    rotation = ca.SX.eye(3) if body.rotation is None else matrix(owner, "rotation", body.rotation, symbols)
+    inertia, planar = inertia_matrix(owner, body.inertia, symbols)
+    return Solid(
         column(owner, "mass", body.mass, 1, symbols),
-        column(owner, "position", ca.densify(position) if isinstance(position, ca.SX) else position, 3, symbols),
-        matrix("rotation", ca.SX.eye(3) if rotation is None else rotation),
-        matrix("inertia", inertia),
+        column(owner, "position", stacked(body.position), 3, symbols),
+        ca.densify(rotation),
+        inertia,
+        planar,
     )
 
 
-def turning(body: Body, q: ca.SX) -> ca.SX:
+def stacked(value: object) -> object:
+    """A list or tuple of entries, or of rows of them, as an expression; anything else as it is, but dense."""
+    if isinstance(value, list | tuple):
+        rows = [item if isinstance(item, list | tuple) else [item] for item in value]
+        try:
+            return ca.densify(ca.SX(ca.blockcat([list(row) for row in rows])))
+        except (RuntimeError, NotImplementedError, TypeError):
+            return value
+    return ca.densify(value) if isinstance(value, ca.SX | ca.DM) else value
+
+
+def matrix(owner: str, what: str, value: object, symbols: Sequence[ca.SX]) -> ca.SX:
+    """A 3 x 3 matrix, dense. Raises ValueError."""
+    given = stacked(value)
+    shape = given.shape if isinstance(given, ca.SX | ca.DM) else None
+    if shape != (3, 3):
+        raise ValueError(f"{owner}: {what}: expected 3 x 3, got {f'{shape[0]} x {shape[1]}' if shape else repr(value)}")
+    return ca.reshape(column(owner, what, ca.vec(given), 9, symbols), 3, 3)
+
+
+def inertia_matrix(owner: str, value: object, symbols: Sequence[ca.SX]) -> tuple[ca.SX, bool]:
+    """An inertia as 3 x 3, and whether it was said as a scalar. Raises ValueError."""
+    given = stacked(value)
+    if isinstance(given, int | float) or (isinstance(given, ca.SX | ca.DM) and given.numel() == 1):
+        return ca.densify(ca.diag(ca.vertcat(0, 0, column(owner, "inertia", given, 1, symbols)))), True
+    return matrix(owner, "inertia", given, symbols), False
+
+
+def turning(body: Solid, q: ca.SX) -> ca.SX:
     """3 x n: times dq it is the angular velocity that the joints give the body, rad/s, body axes."""
     rotation = body.rotation
     if not ca.depends_on(rotation, q):
@@ -71,8 +99,8 @@ def turning(body: Body, q: ca.SX) -> ca.SX:
     return ca.horzcat(*columns)
 
 
-def kinetic_energy_of(bodies: Sequence[Body], q: ca.SX, dq: ca.SX, omega: ca.SX) -> ca.SX:
-    """T, J, as Mechanism.kinetic_energy has it; `bodies` from `expressions_of`."""
+def kinetic_energy_of(bodies: Sequence[Solid], q: ca.SX, dq: ca.SX, omega: ca.SX) -> ca.SX:
+    """T, J, as Mechanism.kinetic_energy has it; `bodies` checked."""
     energy = ca.SX(0)
     for body in bodies:
         v = ca.jtimes(body.position, q, dq) + ca.cross(omega, body.position)
@@ -83,6 +111,6 @@ def kinetic_energy_of(bodies: Sequence[Body], q: ca.SX, dq: ca.SX, omega: ca.SX)
     return energy / 2
 
 
-def potential_energy_of(bodies: Sequence[Body], gravity: ca.SX) -> ca.SX:
+def potential_energy_of(bodies: Sequence[Solid], gravity: ca.SX) -> ca.SX:
     """V, J, as Mechanism.potential_energy has it."""
     return sum((body.mass * ca.dot(gravity, body.position) for body in bodies), ca.SX(0))

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import casadi as ca
 
 from springline.model.declared import column
-from springline.model.mechanisms.body import Body
+from springline.model.mechanisms.body import Solid, inertia_matrix, stacked
 
 JointKind = Literal["revolute", "prismatic"]
 
@@ -54,7 +54,7 @@ class Segment:
 
     frame    3 x 3, joint axes at q = 0 to the parent's axes
     axis     3 x 1, of length 1
-    inertia  3 x 3, about the centre of mass
+    inertia  3 x 3, about the centre of mass; planar: whether it was said as a scalar, about z alone
     """
 
     name: str
@@ -66,6 +66,7 @@ class Segment:
     mass: ca.SX
     com: ca.SX
     inertia: ca.SX
+    planar: bool
 
     def turn(self, q: ca.SX) -> ca.SX:
         """3 x 3: axes of the link to those of the joint at q = 0 (Rodrigues)."""
@@ -123,6 +124,7 @@ def _segment(link: Link, count: int, owner: str, symbols: Sequence[ca.SX]) -> Se
         raise ValueError(f'{owner}: joint: expected "revolute" or "prismatic", got {link.joint!r}')
     if isinstance(link.parent, bool) or not isinstance(link.parent, int) or not -1 <= link.parent < count:
         raise ValueError(f"{owner}: parent: expected the index of a link, or -1 for the base, got {link.parent!r}")
+    inertia, planar = inertia_matrix(owner, link.inertia, symbols)
     axis = _entries(owner, "axis", link.axis, symbols)
     if axis.is_zero():
         raise ValueError(f"{owner}: axis: expected a direction, got {link.axis!r}")
@@ -138,7 +140,8 @@ def _segment(link: Link, count: int, owner: str, symbols: Sequence[ca.SX]) -> Se
         axis,
         _exact(owner, "mass", column(owner, "mass", link.mass, 1, symbols)),
         _entries(owner, "com", link.com, symbols),
-        _inertia(owner, link.inertia, symbols),
+        _exact(owner, "inertia", inertia),
+        planar,
     )
 
 
@@ -148,32 +151,16 @@ def _exact(owner: str, what: str, value: ca.SX) -> ca.SX:
         if entry.is_constant() and float(entry) not in (-1.0, 0.0, 1.0):
             text = "expected 0, 1, -1 or an expression of parameters, which the class declares"
             raise ValueError(f"{owner}: {what}: {text}, got the number {float(entry):g}")
-    return ca.densify(value)
-
-
-def _three(value: object) -> object:
-    return ca.densify(ca.SX(ca.vertcat(*value))) if isinstance(value, list | tuple) else value
+    return value
 
 
 def _entries(owner: str, what: str, value: object, symbols: Sequence[ca.SX]) -> ca.SX:
-    return _exact(owner, what, column(owner, what, _three(value), 3, symbols))
-
-
-def _inertia(owner: str, value: object, symbols: Sequence[ca.SX]) -> ca.SX:
-    if isinstance(value, list | tuple):
-        value = ca.SX(ca.blockcat([list(row) for row in value]))
-    if isinstance(value, ca.SX | ca.DM) and value.shape == (3, 3):
-        flat = _exact(owner, "inertia", column(owner, "inertia", ca.densify(ca.SX(ca.vec(value))), 9, symbols))
-        return ca.reshape(flat, 3, 3)
-    if isinstance(value, ca.SX | ca.DM) and value.numel() != 1:
-        raise ValueError(f"{owner}: inertia: expected 3 x 3, or a scalar, got {value.shape[0]} x {value.shape[1]}")
-    scalar = _exact(owner, "inertia", column(owner, "inertia", value, 1, symbols))
-    return ca.densify(ca.diag(ca.vertcat(0, 0, scalar)))
+    return _exact(owner, what, column(owner, what, stacked(value), 3, symbols))
 
 
 def _frame(owner: str, rpy: object, symbols: Sequence[ca.SX]) -> ca.SX:
     """R = Rz(yaw) Ry(pitch) Rx(roll), quarter turns exact."""
-    roll, pitch, yaw = ca.vertsplit(column(owner, "rpy", _three(rpy), 3, symbols))
+    roll, pitch, yaw = ca.vertsplit(column(owner, "rpy", stacked(rpy), 3, symbols))
 
     def cosine_and_sine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
         if not angle.is_constant():
@@ -192,7 +179,7 @@ def _frame(owner: str, rpy: object, symbols: Sequence[ca.SX]) -> ca.SX:
     return ca.densify(about_z @ about_y @ about_x)
 
 
-def bodies_of(segments: Sequence[Segment], q: ca.SX) -> list[Body]:
+def bodies_of(segments: Sequence[Segment], q: ca.SX) -> list[Solid]:
     """The links as bodies in base axes."""
     frames: dict[int, tuple[ca.SX, ca.SX]] = {-1: (ca.SX.zeros(3), ca.SX.eye(3))}
     for i in outwards(segments):
@@ -203,5 +190,5 @@ def bodies_of(segments: Sequence[Segment], q: ca.SX) -> list[Body]:
             ca.densify(rotation @ segment.frame @ segment.turn(q[i])),
         )
     return [
-        Body(s.mass, frames[i][0] + frames[i][1] @ s.com, frames[i][1], s.inertia) for i, s in enumerate(segments)
+        Solid(s.mass, frames[i][0] + frames[i][1] @ s.com, frames[i][1], s.inertia, s.planar) for i, s in enumerate(segments)
     ]

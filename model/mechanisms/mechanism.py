@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import casadi as ca
 
 from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case
-from springline.model.mechanisms.body import Body, expressions_of, kinetic_energy_of, potential_energy_of
+from springline.model.mechanisms.body import Body, Solid, kinetic_energy_of, potential_energy_of, solid
 from springline.model.mechanisms.link import Link, Segment, bodies_of, segments_of
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.signals import SineTerm
@@ -37,6 +37,8 @@ class Mechanism:
     start_position    initial joint coordinates; () for all zero
     start_rate        initial joint rates; () for all zero
     control_defaults  what the controller's parameters are for this arm, by name: a number, or one per joint
+    regular           whether its mass matrix is positive definite for all that its parameters may be
+    sizes             how many joints it may have, where that is open; `of_size` then gives the arm with so many
     source            where its equations and numbers come from, a sentence; "" where there is nothing to cite
     sampling          what sample periods and delays its loop was seen to bear, Markdown for those who embed it; ""
                       where nothing was measured
@@ -52,26 +54,34 @@ class Mechanism:
     start_position: ClassVar[tuple[float, ...]] = ()
     start_rate: ClassVar[tuple[float, ...]] = ()
     control_defaults: ClassVar[Mapping[str, float | tuple[float, ...]]] = {}
+    _open: ClassVar[frozenset[str]] = frozenset()
+    regular: ClassVar[bool] = False
+    sizes: ClassVar[Sequence[int]] = ()
     source: ClassVar[str] = ""
     sampling: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
         """Fill in what the class leaves open and depends on how many joints it has."""
         cls.name = vars(cls).get("name", snake_case(cls.__name__))
-        joints = getattr(cls, "joints", ())
-        for attribute in ("reference_offset", "start_position", "start_rate"):
-            if not getattr(cls, attribute):
-                setattr(cls, attribute, (0.0,) * len(joints))
-        if not cls.reference_terms:
-            cls.reference_terms = ((),) * len(joints)
+        count = len(getattr(cls, "joints", ()))
+        blanks = {"reference_offset": 0.0, "reference_terms": (), "start_position": 0.0, "start_rate": 0.0}
+        open_ = [name for name in blanks if name not in vars(cls) and (name in cls._open or not getattr(cls, name))]
+        for name in open_:
+            setattr(cls, name, (blanks[name],) * count)
+        cls._open = frozenset(open_)
+
+    def of_size(self, size: int) -> Mechanism:
+        """The arm with `size` joints, one of `sizes`; 0 stands for as many as it has."""
+        return self
 
     def links(self, p: Values) -> Sequence[Link]:
         """The kinematic tree: one link per joint, in the order of `joints`."""
         raise NotImplementedError
 
     def bodies(self, q: ca.SX, p: Values) -> Sequence[Body]:
-        """The bodies that the arm consists of, for joint coordinates q (n x 1)."""
-        return bodies_of(self.segments(p), q)
+        """The bodies that the arm consists of, for joint coordinates q (n x 1); those of `links` unless said."""
+        return [Body(s.mass, s.position, s.rotation, s.inertia[2, 2] if s.planar else s.inertia)
+                for s in bodies_of(self.segments(p), q)]
 
     def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX:
         """T, J, seen from a frame that moves with the base origin.
@@ -106,12 +116,12 @@ class Mechanism:
         joints = [joint.name for joint in self.joints]
         return segments_of(self.links(p), joints, f"mechanism {self.name}", list(p.values()))
 
-    def checked_bodies(self, q: ca.SX, p: Values) -> list[Body]:
+    def checked_bodies(self, q: ca.SX, p: Values) -> list[Solid]:
         """The bodies as expressions. Raises ValueError."""
         owner, bodies = f"mechanism {self.name}: bodies", self.bodies(q, p)
         if not isinstance(bodies, list | tuple) or not bodies:
             raise ValueError(f"{owner}: expected a list of at least one Body, got {bodies!r}")
-        return [expressions_of(body, f"{owner}[{i}]", [q, *p.values()]) for i, body in enumerate(bodies)]
+        return [solid(body, f"{owner}[{i}]", [q, *p.values()]) for i, body in enumerate(bodies)]
 
     def fitted(self, parameter: Parameter) -> Parameter:
         """A parameter of the controller with the default that suits this arm.

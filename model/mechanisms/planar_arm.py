@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import ClassVar
 
-import casadi as ca
-
-from springline.model.mechanisms.link import Link, bodies_of
+from springline.model.mechanisms.link import Link
 from springline.model.mechanisms.mechanism import Mechanism
 from springline.model.parameters import NON_NEGATIVE, POSITIVE, Joint, Parameter, Values
 
 MOST_JOINTS = 7
+
+
+def _joints(count: int) -> tuple[Joint, ...]:
+    return tuple(Joint(f"joint{k + 1}", "rad", "N m") for k in range(count))
 
 
 class PlanarArm(Mechanism):
@@ -18,7 +21,7 @@ class PlanarArm(Mechanism):
 
     name = "planar_arm"
     sizes: ClassVar = range(1, MOST_JOINTS + 1)
-    joints = tuple(Joint(f"joint{k}", "rad", "N m") for k in (1, 2))
+    joints = _joints(2)
     parameters = (
         Parameter("length", "m", 0.5, "distance from a link's joint to its end", POSITIVE, per_joint=True),
         Parameter("mass", "kg", 2.0, "mass of a link", POSITIVE, per_joint=True),
@@ -30,6 +33,10 @@ class PlanarArm(Mechanism):
     )
     motor_inertia = (Parameter("motor_inertia", "kg m^2", 0.1, "motor, seen at the joint", POSITIVE, per_joint=True),)
     stiffness = (Parameter("stiffness", "N m/rad", 1.0e4, "stiffness of the spring", POSITIVE, per_joint=True),)
+
+    def of_size(self, size: int) -> Mechanism:
+        """The arm with `size` joints."""
+        return self if size in (0, len(self.joints)) else _planar_arm(size)
 
     def links(self, p: Values) -> list[Link]:
         """A chain; every axis is z, every frame is parallel to the base's at rest."""
@@ -45,3 +52,10 @@ class PlanarArm(Mechanism):
             )
             for k, joint in enumerate(self.joints)
         ]
+
+
+@cache
+def _planar_arm(size: int) -> Mechanism:
+    made = type("PlanarArm", (PlanarArm,), {"name": PlanarArm.name, "joints": _joints(size)})
+    arm: Mechanism = made()
+    return arm
