@@ -37,6 +37,11 @@ class BaseMotion:
     ddb: ca.SX
 
     @property
+    def position(self) -> ca.SX:
+        """Of the base's origin in inertial axes, 3 x 1, m."""
+        return ca.vertcat(0, self.b[0], 0)
+
+    @property
     def rotation(self) -> ca.SX:
         """R, 3 x 3: base axes to inertial axes."""
         cz, sz = ca.cos(self.b[1]), ca.sin(self.b[1])

@@ -24,6 +24,7 @@ from springline.model.base import BaseMotion
 from springline.model.dynamics import newton_euler, rigid_bodies
 from springline.model.dynamics.lagrange import energies_of
 from springline.model.mechanisms import Mechanism
+from springline.model.mechanisms.link import aligned
 from springline.model.parameters import Values
 from springline.model.symbolic import TooManyTerms, collect, operations
 
@@ -130,7 +131,7 @@ def _factored(
         return rigid_bodies.inverse_dynamics(bodies, q, rates, *imu)
 
     if mechanism.said_as == "links":
-        segments = mechanism.segments(p)
+        segments = aligned(mechanism.segments(p))
         mass = newton_euler.mass_matrix(segments, q)
     else:
         bodies = mechanism.checked_bodies(q, p)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import casadi as ca
@@ -73,9 +73,8 @@ class Segment:
         if not self.revolute:
             return ca.SX.eye(3)
         c, s, a = ca.cos(q), ca.sin(q), self.axis
-        along = [k for k in range(3) if not a[k].is_zero()]
-        if len(along) == 1:
-            k = along[0]
+        if _along_one(a):
+            k = next(k for k in range(3) if not a[k].is_zero())
             i, j = (k + 1) % 3, (k + 2) % 3
             turned = ca.SX.eye(3)
             turned[i, i] = turned[j, j] = c
@@ -111,6 +110,37 @@ def segments_of(links: object, joints: Sequence[str], owner: str, symbols: Seque
     return made
 
 
+def aligned(segments: Sequence[Segment]) -> tuple[Segment, ...]:
+    """The same tree with link axes turned so that every joint's axis is one of them, up to its sign.
+
+    A turn about a coordinate axis is four multiplications, one about a direction that parameters say is nine and more;
+    the turns between depend on parameters alone.
+    """
+    into = [ca.SX.eye(3) if _along_one(s.axis) else _basis(s.axis) for s in segments]
+    result = []
+    for s, own in zip(segments, into, strict=True):
+        outer = into[s.parent].T if s.parent >= 0 else ca.SX.eye(3)
+        origin, frame, com = outer @ s.origin, outer @ s.frame @ own, own.T @ s.com
+        axis = s.axis if _along_one(s.axis) else ca.SX([0, 0, 1])
+        inertia = own.T @ s.inertia @ own
+        moved = {"origin": origin, "frame": frame, "com": com, "axis": axis, "inertia": inertia}
+        result.append(replace(s, **{name: ca.densify(value) for name, value in moved.items()}))
+    return tuple(result)
+
+
+def _along_one(axis: ca.SX) -> bool:
+    return sum(not axis[k].is_zero() for k in range(3)) == 1
+
+
+def _basis(axis: ca.SX) -> ca.SX:
+    """A rotation that turns z into a unit vector, 3 x 3, without a singular direction (Duff et al. 2017, JCGT 6(1))."""
+    x, y, z = ca.vertsplit(axis)
+    sign = ca.if_else(z >= 0, 1, -1)
+    a = -1 / (sign + z)
+    b = x * y * a
+    return ca.horzcat(ca.vertcat(1 + sign * x * x * a, sign * b, -sign * x), ca.vertcat(b, sign + y * y * a, -y), axis)
+
+
 def outwards(segments: Sequence[Segment]) -> list[int]:
     """Indices of the links, each after its parent."""
     def depth(i: int) -> int:
@@ -128,9 +158,10 @@ def _segment(link: Link, count: int, owner: str, symbols: Sequence[ca.SX]) -> Se
     axis = _entries(owner, "axis", link.axis, symbols)
     if axis.is_zero():
         raise ValueError(f"{owner}: axis: expected a direction, got {link.axis!r}")
-    exact = [k for k in range(3) if not axis[k].is_zero()]
-    if len(exact) > 1 or not axis[exact[0]].is_constant():
+    if not _along_one(axis):
         axis = axis / ca.norm_2(axis)
+    elif not axis.is_constant():
+        axis = ca.sign(axis)
     return Segment(
         link.name,
         link.joint == "revolute",
