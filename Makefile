@@ -3,7 +3,7 @@
 
 PYTHON  ?= python3
 WORKERS ?= 2
-EXTRAS  ?= dev
+EXTRAS  ?= dev,verify
 OUT     ?= reproduction
 
 BIN    := .venv/bin

@@ -4,6 +4,8 @@ from .base import BaseMotion as BaseMotion
 from .control import Control as Control
 from .control import Controller as Controller
 from .control import Law as Law
+from .mechanisms import Body as Body
+from .mechanisms import Link as Link
 from .mechanisms import Mechanism as Mechanism
 from .parameters import Bounds as Bounds
 from .parameters import Joint as Joint

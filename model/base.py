@@ -37,6 +37,11 @@ class BaseMotion:
     ddb: ca.SX
 
     @property
+    def position(self) -> ca.SX:
+        """Of the base's origin in inertial axes, 3 x 1, m."""
+        return ca.vertcat(0, self.b[0], 0)
+
+    @property
     def rotation(self) -> ca.SX:
         """R, 3 x 3: base axes to inertial axes."""
         cz, sz = ca.cos(self.b[1]), ca.sin(self.b[1])
@@ -58,6 +63,10 @@ class BaseMotion:
     def specific_force(self, g: ca.SX) -> ca.SX:
         """(g + acceleration of the shake) along the inertial Y, 3 x 1, m/s^2, base axes; [0, g, 0] at rest."""
         return self.rotation.T @ ca.vertcat(0, g + self.ddb[0], 0)
+
+    def rest_force(self, g: ca.SX) -> ca.SX:
+        """`specific_force` of a base at rest, 3 x 1, m/s^2, base axes: [0, g, 0]."""
+        return ca.vertcat(0, g, 0)
 
     def excess_force(self, g: ca.SX) -> ca.SX:
         """`specific_force` less [0, g, 0], 3 x 1, m/s^2, written so that a small excess keeps its digits."""

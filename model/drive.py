@@ -16,7 +16,7 @@ from typing import Literal, Protocol
 
 import casadi as ca
 
-from springline.model.lagrange import EquationsOfMotion
+from springline.model.dynamics import EquationsOfMotion
 from springline.model.mechanisms import Mechanism
 from springline.model.parameters import Bounds, Parameter, Values
 from springline.model.perturbation import slow_mass

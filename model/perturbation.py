@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from springline.model.lagrange import EquationsOfMotion
+from springline.model.dynamics import EquationsOfMotion
 from springline.model.symbolic import over, solve_spd
 
 

@@ -28,6 +28,7 @@ class SignalShape:
 class Structure:
     """Everything about a system that is no number: a new structure is a new kernel, a new number is not.
 
+    size           how many joints a mechanism has that comes in several sizes, 0 for as many as it has
     controller     by name; law, log_form and exponents are those of one that has a reaching law
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
     effects        properties of sensors and motors, by name, in the order in which they act
@@ -47,6 +48,7 @@ class Structure:
     integrator: str = "rk4"
     effects: tuple[str, ...] = ()
     controller: str = "terminal_sliding"
+    size: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,12 @@ the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
 import casadi as ca
+import numpy as np
 
 from springline.model import perturbation, signals
 from springline.model.base import COORDINATES, BaseMotion
@@ -33,8 +35,8 @@ from springline.model.control import (
 from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
 from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
-from springline.model.lagrange import EquationsOfMotion, equations_of_motion
-from springline.model.mechanisms import MECHANISMS, Mechanism
+from springline.model.dynamics import EquationsOfMotion, equations_of_motion
+from springline.model.mechanisms import MECHANISMS, Mechanism, expect_plausible
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
 from springline.model.quantities import (
     A_LAW,
@@ -78,7 +80,8 @@ def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tu
 
 def own_control_tables(structure: Structure) -> dict[str, tuple[Parameter, ...]]:
     """Tables [control.<name>] of a structure: the parameters of its controller, and of a law that is a user's own."""
-    mechanism, controller = MECHANISMS[structure.mechanism], CONTROLLERS[structure.controller]
+    mechanism = MECHANISMS[structure.mechanism].of_size(structure.size)
+    controller = CONTROLLERS[structure.controller]
     law = LAWS[structure.law]
     owners: list[Controller | Law] = [controller] if LAWS.is_packaged(structure.law) else [controller, law]
     return {
@@ -98,7 +101,7 @@ class System:
 
     def __init__(self, structure: Structure | None = None) -> None:
         self.structure = structure or Structure()
-        self.mechanism: Mechanism = MECHANISMS[self.structure.mechanism]
+        self.mechanism: Mechanism = MECHANISMS[self.structure.mechanism].of_size(self.structure.size)
         self.drive: Drive = DRIVES[self.structure.drive]
         law = LAWS[self.structure.law].with_form(self.structure.log_form)
         self.controller: Controller = CONTROLLERS[self.structure.controller].with_law(law, self.structure.exponents)
@@ -247,8 +250,7 @@ class System:
     @cached_property
     def functions(self) -> dict[str, ca.Function]:
         """All Functions, parameters symbolic. Those of the paper's equations first, then the loop's."""
-        real = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
-        signals = self._commanded
+        real, signals = self.arm, self._commanded
         applied = actuated(self.structure.effects, self.u)
         with noted() as terms:
             dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant)
@@ -257,6 +259,19 @@ class System:
             **self._equations(real, signals, dx),
             **self._loop(real, signals, dx),
         }
+
+    @cached_property
+    def arm(self) -> EquationsOfMotion:
+        """The arm that moves: its equations of motion, with the plant's parameters."""
+        return equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
+
+    def expect_plausible(self, q: Sequence[float], values: np.ndarray) -> None:
+        """Raise ValueError for masses and inertias that no body has, of the plant or of the controller's arm.
+
+        q  joint coordinates, n;  values: the parameter vector p
+        """
+        for p in (self._nominal, self._plant):
+            expect_plausible(self.mechanism, p, self.p, q, values)
 
     def terms(self, name: str) -> tuple[Term, ...]:
         """What the model calls the parts of Function `name`; they are the outputs of Function `name`_terms."""
@@ -271,7 +286,7 @@ class System:
         return signals
 
     def _signals_of_control(self) -> ControlSignals:
-        nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal)
+        nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal, self.arm.form)
         return commanded(
             self.controller,
             self.joints,
@@ -386,7 +401,7 @@ class System:
 
     def _arm_energy(self) -> ca.SX:
         """Kinetic and potential energy of the arm with the base at rest, J."""
-        rest, up = ca.SX.zeros(3), ca.vertcat(0, self._plant.g, 0)
+        rest, up = ca.SX.zeros(3), self.base.rest_force(self._plant.g)
         moving = self.mechanism.kinetic_energy(self.q1, self.dq1, rest, self._plant)
         return moving + self.mechanism.potential_energy(self.q1, up, self._plant)
 

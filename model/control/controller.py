@@ -24,7 +24,7 @@ import casadi as ca
 from springline.model.control.reaching import Law
 from springline.model.control.sliding import SurfaceExponents
 from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case
-from springline.model.lagrange import EquationsOfMotion
+from springline.model.dynamics import EquationsOfMotion
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.perturbation import slow_mass
 from springline.model.quantities import SIGMA, U_WISHED, Quantity

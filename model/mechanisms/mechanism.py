@@ -1,16 +1,17 @@
-"""What a mechanism has to tell: its joints, its parameters and its energies. Everything else has a default."""
+"""What a mechanism has to tell: its joints, its parameters and what it consists of. All else has a default."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import casadi as ca
 
 from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case
+from springline.model.mechanisms.body import Body, Solid, kinetic_energy_of, potential_energy_of, solid
+from springline.model.mechanisms.link import Link, Segment, bodies_of, segments_of
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.signals import SineTerm
 
@@ -19,8 +20,12 @@ from springline.model.signals import SineTerm
 _FAST_DAMPING = 0.5
 
 
-class Mechanism(ABC):
-    """An arm of n joints, n >= 1. A subclass says at least its joints, parameters, motors, springs and two energies.
+class Mechanism:
+    """An arm of n joints, n >= 1. A subclass says its joints, parameters, motors and springs, and what it consists of.
+
+    That is one of: `links` (a kinematic tree), `bodies`, or `kinetic_energy` and `potential_energy`. The equations of
+    motion follow; where a subclass says several, energies count before bodies and bodies before links, so that it can
+    add to what it has inherited.
 
     name              in scenario files: the class's name in snake_case unless the class says otherwise
     joints            in the order of q
@@ -32,6 +37,8 @@ class Mechanism(ABC):
     start_position    initial joint coordinates; () for all zero
     start_rate        initial joint rates; () for all zero
     control_defaults  what the controller's parameters are for this arm, by name: a number, or one per joint
+    regular           whether its mass matrix is positive definite for all that its parameters may be
+    sizes             how many joints it may have, where that is open; `of_size` then gives the arm with so many
     source            where its equations and numbers come from, a sentence; "" where there is nothing to cite
     sampling          what sample periods and delays its loop was seen to bear, Markdown for those who embed it; ""
                       where nothing was measured
@@ -47,30 +54,74 @@ class Mechanism(ABC):
     start_position: ClassVar[tuple[float, ...]] = ()
     start_rate: ClassVar[tuple[float, ...]] = ()
     control_defaults: ClassVar[Mapping[str, float | tuple[float, ...]]] = {}
+    _open: ClassVar[frozenset[str]] = frozenset()
+    regular: ClassVar[bool] = False
+    sizes: ClassVar[Sequence[int]] = ()
     source: ClassVar[str] = ""
     sampling: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
         """Fill in what the class leaves open and depends on how many joints it has."""
         cls.name = vars(cls).get("name", snake_case(cls.__name__))
-        joints = getattr(cls, "joints", ())
-        for attribute in ("reference_offset", "start_position", "start_rate"):
-            if not getattr(cls, attribute):
-                setattr(cls, attribute, (0.0,) * len(joints))
-        if not cls.reference_terms:
-            cls.reference_terms = ((),) * len(joints)
+        count = len(getattr(cls, "joints", ()))
+        blanks = {"reference_offset": 0.0, "reference_terms": (), "start_position": 0.0, "start_rate": 0.0}
+        open_ = [name for name in blanks if name not in vars(cls) and (name in cls._open or not getattr(cls, name))]
+        for name in open_:
+            setattr(cls, name, (blanks[name],) * count)
+        cls._open = frozenset(open_)
 
-    @abstractmethod
+    def of_size(self, size: int) -> Mechanism:
+        """The arm with `size` joints, one of `sizes`; 0 stands for as many as it has."""
+        return self
+
+    def links(self, p: Values) -> Sequence[Link]:
+        """The kinematic tree: one link per joint, in the order of `joints`."""
+        raise NotImplementedError
+
+    def bodies(self, q: ca.SX, p: Values) -> Sequence[Body]:
+        """The bodies that the arm consists of, for joint coordinates q (n x 1); those of `links` unless said."""
+        return [Body(s.mass, s.position, s.rotation, s.inertia[2, 2] if s.planar else s.inertia)
+                for s in bodies_of(self.segments(p), q)]
+
     def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX:
         """T, J, seen from a frame that moves with the base origin.
 
         q, dq  n x 1;  omega  3 x 1, angular velocity of the base, rad/s, base axes. The velocity of a point r(q) is
         jtimes(r, q, dq) + cross(omega, r), base axes.
         """
+        return kinetic_energy_of(self.checked_bodies(q, p), q, dq, omega)
 
-    @abstractmethod
     def potential_energy(self, q: ca.SX, gravity: ca.SX, p: Values) -> ca.SX:
         """V, J.  gravity: 3 x 1 vector that points up, m/s^2, base axes."""
+        return potential_energy_of(self.checked_bodies(q, p), gravity)
+
+    @property
+    def said_as(self) -> Literal["energies", "bodies", "links", ""]:
+        """Which way of saying what the arm consists of counts; "" where there is none."""
+        mine = type(self)
+        if mine.kinetic_energy is not Mechanism.kinetic_energy:
+            return "energies" if mine.potential_energy is not Mechanism.potential_energy or self._has_bodies else ""
+        if not self._has_bodies:
+            return ""
+        if mine.potential_energy is not Mechanism.potential_energy:
+            return "energies"
+        return "bodies" if mine.bodies is not Mechanism.bodies else "links"
+
+    @property
+    def _has_bodies(self) -> bool:
+        return type(self).bodies is not Mechanism.bodies or type(self).links is not Mechanism.links
+
+    def segments(self, p: Values) -> tuple[Segment, ...]:
+        """The links, checked. Raises ValueError."""
+        joints = [joint.name for joint in self.joints]
+        return segments_of(self.links(p), joints, f"mechanism {self.name}", list(p.values()))
+
+    def checked_bodies(self, q: ca.SX, p: Values) -> list[Solid]:
+        """The bodies as expressions. Raises ValueError."""
+        owner, bodies = f"mechanism {self.name}: bodies", self.bodies(q, p)
+        if not isinstance(bodies, list | tuple) or not bodies:
+            raise ValueError(f"{owner}: expected a list of at least one Body, got {bodies!r}")
+        return [solid(body, f"{owner}[{i}]", [q, *p.values()]) for i, body in enumerate(bodies)]
 
     def fitted(self, parameter: Parameter) -> Parameter:
         """A parameter of the controller with the default that suits this arm.
@@ -98,6 +149,9 @@ def check_mechanism(mechanism: Mechanism) -> None:
     if not isinstance(joints, tuple) or not joints or not all(isinstance(joint, Joint) for joint in joints):
         raise ValueError(f"{owner}: joints: expected a tuple of at least one Joint, got {joints!r}")
     expect_names(owner, "joints", [joint.name for joint in joints])
+    if not mechanism.said_as:
+        text = "expected links(p), bodies(q, p), or kinetic_energy(q, dq, omega, p) and potential_energy(q, gravity, p)"
+        raise ValueError(f"{owner}: does not say what the arm consists of: {text}")
     expect_names(owner, "name", [mechanism.name])
     for text in (mechanism.source, *(text for joint in joints for text in (joint.unit, joint.force))):
         expect_text(owner, "units and source", text)

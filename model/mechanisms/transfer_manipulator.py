@@ -42,6 +42,7 @@ class TransferManipulator(Mechanism):
     start_position = (0.8, 0.5)
     control_defaults: ClassVar = {"mu": (12.0, 5.0), "K_f": (200.0, 2.6)}  # Table 3
 
+    regular = True
     source = "Guo et al. 2023, Journal of Marine Science and Engineering 11(3) 474."
     sampling = """Measured on this arm and drive with the packaged gains (`paper/nominal`), delay being the time from
 measurement to command:

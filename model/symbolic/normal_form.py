@@ -16,6 +16,13 @@ import casadi as ca
 Monomial = tuple[tuple[int, int], ...]
 Polynomial = dict[Monomial, float]
 
+# Terms of one polynomial, beyond which a normal form is not worth its making: the paper's arm has 13 at most.
+_MOST_TERMS = 600
+
+
+class TooManyTerms(Exception):
+    """A normal form explodes."""
+
 
 class _Atoms:
     """The indeterminates: symbols, and functions of normal forms (sin, cos, or anything not polynomial)."""
@@ -32,14 +39,19 @@ class _Atoms:
         return self._index[key]
 
 
-def _add(a: Polynomial, b: Polynomial, scale: float = 1.0) -> Polynomial:
-    result = dict(a)
+def _accumulate(result: Polynomial, b: Polynomial, scale: float = 1.0) -> None:
+    """Add a polynomial to `result`, in place."""
     for monomial, coefficient in b.items():
         value = result.get(monomial, 0.0) + scale * coefficient
         if value == 0.0:
             result.pop(monomial, None)
         else:
             result[monomial] = value
+
+
+def _add(a: Polynomial, b: Polynomial, scale: float = 1.0) -> Polynomial:
+    result = dict(a)
+    _accumulate(result, b, scale)
     return result
 
 
@@ -52,9 +64,13 @@ def _merge(a: Monomial, b: Monomial) -> Monomial:
 
 def _multiply(a: Polynomial, b: Polynomial, atoms: _Atoms) -> Polynomial:
     result: Polynomial = {}
+    if len(a) * len(b) > _MOST_TERMS * 10:
+        raise TooManyTerms
     for left, u in a.items():
         for right, v in b.items():
-            result = _add(result, _reduce(_merge(left, right), u * v, atoms))
+            _accumulate(result, _reduce(_merge(left, right), u * v, atoms))
+    if len(result) > _MOST_TERMS:
+        raise TooManyTerms
     return result
 
 
@@ -185,7 +201,8 @@ def collect(expression: ca.SX, symbols: ca.SX, levels: Sequence[ca.SX]) -> ca.SX
     symbols  column of all free symbols
     levels   columns of symbols, the fastest-changing first: terms are grouped by their factors that depend on
              levels[0], their coefficients by factors that depend on levels[1], and so on
-    Raises ValueError where the expression holds an operation that cannot be rebuilt (named).
+    Raises ValueError where the expression holds an operation that cannot be rebuilt (named), TooManyTerms where it
+    explodes.
     """
     function = ca.Function("expression", [symbols], [ca.densify(ca.vec(expression))])
     atoms = _Atoms()

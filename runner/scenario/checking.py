@@ -49,8 +49,10 @@ def resolve(
     # Which keys are valid depends on all that was chosen, and on the drive, whose kind decides what it can be told.
     drive = given["drive"].get("kind", schema.DEFAULT_KINDS["drive"])
     drive = cast(DriveKind, drive if drive in DRIVES else schema.DEFAULT_KINDS["drive"])
+    size = size_given(mechanism, given["mechanism"])
+    joints = MECHANISMS[mechanism].of_size(size).joints
     try:
-        shape = schema.schema(mechanism, drive, names["control.controller"], names["control.law"])
+        shape = schema.schema(mechanism, drive, names["control.controller"], names["control.law"], size)
     except ValueError as error:
         raise InputError(*problems, Problem(where, "control", str(error))) from error
 
@@ -79,7 +81,7 @@ def resolve(
     problems += _whole_problems(document, "simulation.duration", where)
     duration = document["simulation"].get("duration")
     units = {
-        "reference": {joint.name: joint.unit for joint in MECHANISMS[mechanism].joints},
+        "reference": {joint.name: joint.unit for joint in joints},
         "base_motion": {c.key: c.unit for c in COORDINATES},
     }
     tables: list[Spline] = []
@@ -98,6 +100,12 @@ def resolve(
     if problems:
         raise InputError(*problems)
     return document, tuple(tables), tuple(notes), code
+
+
+def size_given(mechanism: str, table: Mapping[str, object]) -> int:
+    """How many joints a [mechanism] table asks for; 0 for as many as there are, or where it asks for what is none."""
+    size = table.get(schema.SIZE)
+    return size if isinstance(size, int) and size in MECHANISMS[mechanism].sizes else 0
 
 
 def _opened_doors(

@@ -25,7 +25,7 @@ from springline.model.structure import MotorStart, SignalKind, SignalShape, Stru
 from springline.model.system import System
 from springline.runner.files import InputError, Problem, document_text, read_toml, shortened, unknown
 from springline.runner.scenario import schema
-from springline.runner.scenario.checking import Document, resolve
+from springline.runner.scenario.checking import Document, resolve, size_given
 from springline.runner.scenario.dotted import expect_keys, flat, plain, replaced, scale_key
 from springline.runner.scenario.locate import expect_kind, read_scenario, relative_path
 from springline.runner.scenario.splines import Spline
@@ -151,7 +151,8 @@ class Scenario:
         control, initial = self.document["control"], self.document["initial"]
         motor = initial.get("q_motor", "unloaded")
         mechanism = self.registered(self.document["mechanism"]["name"])
-        joints = [joint.name for joint in MECHANISMS[mechanism].joints]
+        size = size_given(mechanism, self.document["mechanism"])
+        joints = [joint.name for joint in MECHANISMS[mechanism].of_size(size).joints]
         return Structure(
             mechanism=mechanism,
             law=self.registered(control["law"]),
@@ -164,6 +165,7 @@ class Scenario:
             drive=cast(DriveKind, self.document["drive"]["kind"]),
             start="reference" if initial.get("on_reference") else "given",
             integrator=self.integrator,
+            size=size,
         )
 
     def system(self) -> System:
@@ -308,7 +310,7 @@ class Scenario:
         where  what the scenario came from, for messages
         Raises InputError.
         """
-        if not self.code:
+        if not self.code and MECHANISMS[self.structure().mechanism].regular:
             return
         keys = {
             user: f"{table}.{key}"
@@ -317,14 +319,24 @@ class Scenario:
             if self.document[table][key] == user.reference
         }
         with told(keys, where):
-            _expect_printable(self.structure())
-        for user, key in keys.items():
-            if key == "mechanism.name" and self.structure().start == "given":
-                mass = np.array(self.system().function("mass_matrix")(self.document["initial"]["q"], self.values()))
-                sizes = np.linalg.eigvalsh(mass) if np.isfinite(mass).all() else np.array([np.nan])
-                if not sizes[0] > _SINGULAR * sizes[-1]:
-                    text = "the mass matrix at the start is not positive definite, its least eigenvalue is"
-                    raise InputError(Problem(where, key, f"{user}: {text} {sizes[0]:.3g}"))
+            if keys:
+                _expect_printable(self.structure())
+        if self.structure().start == "given":
+            user = next((user for user, key in keys.items() if key == "mechanism.name"), None)
+            self._expect_bodies(where, "mechanism" if user is None else "mechanism.name", f"{user}: " if user else "")
+
+    def _expect_bodies(self, where: str, key: str, owner: str) -> None:
+        """Raise InputError for masses and inertias that no arm has at the start."""
+        q, values = self.document["initial"]["q"], self.values()
+        try:
+            self.system().expect_plausible(q, values)
+        except ValueError as error:
+            raise InputError(Problem(where, key, f"{owner}{error}")) from error
+        mass = np.array(self.system().function("mass_matrix")(q, values))
+        sizes = np.linalg.eigvalsh(mass) if np.isfinite(mass).all() else np.array([np.nan])
+        if not sizes[0] > _SINGULAR * sizes[-1]:
+            text = "the mass matrix at the start is not positive definite, its least eigenvalue is"
+            raise InputError(Problem(where, key, f"{owner}{text} {sizes[0]:.3g}"))
 
     def _canonical(self, overrides: Mapping[str, object], where: str) -> dict[str, object]:
         """Overrides that name users' classes as the document does, so that the same one is known for the same."""
@@ -338,11 +350,15 @@ class Scenario:
     def _joints_with(self, overrides: Mapping[str, object], where: str) -> int:
         """How many joints there are with these overrides; 1 for a mechanism that is unknown, which is told later."""
         given = overrides.get("mechanism.name")
+        size = {schema.SIZE: overrides.get(f"mechanism.{schema.SIZE}")}
+        if given is None and size[schema.SIZE] is None:
+            size = self.document["mechanism"]
         if schema.names_file(given):
             user = read_class(str(given), where, "mechanism.name")
-            return len(load_class(user, MECHANISMS, where, "mechanism.name").joints)
+            load_class(user, MECHANISMS, where, "mechanism.name")
+            return len(MECHANISMS[user.key].of_size(size_given(user.key, size)).joints)
         name = self.registered(self.document["mechanism"]["name"]) if given is None else str(given)
-        return len(MECHANISMS[name].joints) if name in MECHANISMS else 1
+        return len(MECHANISMS[name].of_size(size_given(name, size)).joints) if name in MECHANISMS else 1
 
     def _without_excluded(self, overrides: Mapping[str, object]) -> Document:
         """A copy of the document without what the overrides exclude."""
@@ -363,9 +379,13 @@ class Scenario:
             control = {k: _without_lists(v) for k, v in document["control"].items() if not isinstance(v, list)}
             document = {name: document[name] for name in ("base_motion", "simulation")} | {"control": control}
             document["drive"] = {"kind": drive}
+        elif overrides.get(f"mechanism.{schema.SIZE}", self.structure().size) != self.structure().size:
+            document = self._resized(document, overrides[f"mechanism.{schema.SIZE}"])
         elif drive in DRIVES and drive != document["drive"]["kind"]:
             structure = self.structure()
-            shape = schema.schema(structure.mechanism, cast(DriveKind, drive), structure.controller, structure.law)
+            shape = schema.schema(
+                structure.mechanism, cast(DriveKind, drive), structure.controller, structure.law, structure.size
+            )
             sections = {name: shape.sections[name] for name in ("plant", "control", "initial")}
             for name, section in (sections | {"drive": shape.kinds["drive"][str(drive)]}).items():
                 document[name] = {k: v for k, v in document[name].items() if k in section.model_fields}
@@ -378,6 +398,17 @@ class Scenario:
         elif given & {"q", "dq", "q_motor"}:
             document.get("initial", {}).pop("on_reference", None)
         return document
+
+    def _resized(self, document: Document, size: object) -> Document:
+        """The document for as many joints: what is the same for all is so for these, and those that go lose theirs.
+
+        What differs from joint to joint stays a list, which is found to have too few or too many entries.
+        """
+        spread = {name: _without_equal(document[name]) for name in ("mechanism", "drive", "plant", "control", "initial")}
+        name = self.structure().mechanism
+        kept = {joint.name for joint in MECHANISMS[name].of_size(size_given(name, {schema.SIZE: size})).joints}
+        gone = {joint.name for joint in self.system().joints} - kept
+        return document | spread | {"reference": {k: v for k, v in document["reference"].items() if k not in gone}}
 
     def to_toml(self, folder: Path | None = None) -> str:
         """The complete scenario as TOML; loading it gives an equal one.
@@ -504,6 +535,13 @@ def _with_paths(document: Document, moved: Callable[[str], str], named: Callable
 def _without_lists(value: object) -> object:
     """A table without what there is one of for each joint; anything else as it is."""
     return {k: v for k, v in value.items() if not isinstance(v, list)} if isinstance(value, dict) else value
+
+
+def _without_equal(value: object) -> Any:
+    """A table with one number in place of a list of equal ones."""
+    if isinstance(value, dict):
+        return {key: _without_equal(item) for key, item in value.items()}
+    return value[0] if isinstance(value, list) and value and all(item == value[0] for item in value) else value
 
 
 @lru_cache(maxsize=64)

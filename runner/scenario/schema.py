@@ -30,6 +30,9 @@ from springline.runner.scenario.splines import ENDS, UNITS
 Mode = Literal["continuous", "sampled"]
 Kind = Literal["none", "sine", "polynomial", "table"]
 
+SIZE = "n"
+"""The key of [mechanism] for the number of joints of a mechanism that comes in several sizes."""
+
 MOTOR_STARTS = ("unloaded", "equilibrium")
 
 _DEFAULT = Structure()
@@ -122,6 +125,18 @@ def whole(most: int, *, odd: bool = False) -> Leaf:
 
     def check(value: object) -> int:
         if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= most and (value % 2 or not odd):
+            return value
+        raise _wrong(f"expected {expected}")
+
+    return Leaf(expected, check)
+
+
+def one_of(numbers: Sequence[int], meaning: str) -> Leaf:
+    """One of several integers."""
+    expected = f"the {meaning}, one of {', '.join(map(str, numbers))}"
+
+    def check(value: object) -> int:
+        if isinstance(value, int) and not isinstance(value, bool) and value in numbers:
             return value
         raise _wrong(f"expected {expected}")
 
@@ -285,17 +300,20 @@ DOOR_KEYS = tuple(f"{table}.{key}" for table, key in DOORS)
 
 
 @lru_cache
-def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, law: str = _DEFAULT.law) -> Schema:
+def schema(
+    name: str, drive: DriveKind, controller: str = _DEFAULT.controller, law: str = _DEFAULT.law, size: int = 0
+) -> Schema:
     """The schema for the mechanism, kind of drive, controller and law that are registered as such.
 
+    size  how many joints the mechanism has, 0 for as many as it has by default
     Raises ValueError for a controller or law whose table [control.<its name>] would be a key that there is already.
     """
-    mechanism = MECHANISMS[name]
+    mechanism = MECHANISMS[name].of_size(size)
     joints = mechanism.joints
     arm, moving = mechanism.parameters, DRIVES[drive].parameters(mechanism)
     named = (Annotated[str, door("mechanism", MECHANISMS)], name)
     shared = _numbers(control_parameters(mechanism, drive), joints)
-    own = own_control_tables(Structure(name, law, drive=drive, controller=controller))
+    own = own_control_tables(Structure(name, law, drive=drive, controller=controller, size=size))
     for taken in own:
         if taken in shared or taken in ControlStructure.model_fields:
             raise ValueError(f"{taken!r} is a key of [control] already: give the class another name")
@@ -312,7 +330,7 @@ def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, l
     sines: dict[str, Any] = {key: (_terms(unit), []) for key, unit in coordinates.items()}
     return Schema(
         sections={
-            "mechanism": _section("mechanism", {"name": named, **_numbers(arm, joints)}),
+            "mechanism": _section("mechanism", {"name": named, **_size(mechanism), **_numbers(arm, joints)}),
             "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *moving)}),
             "control": _section("control", shared | _own_tables(own, joints), ControlStructure),
             "initial": _section("initial", initial),
@@ -332,6 +350,13 @@ def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, l
             },
         },
     )
+
+
+def _size(mechanism: Mechanism) -> dict[str, Any]:
+    """The key for the number of joints, of a mechanism that comes in several sizes."""
+    if not mechanism.sizes:
+        return {}
+    return {SIZE: (Annotated[int, one_of(mechanism.sizes, "number of joints")], len(mechanism.joints))}
 
 
 def _own_tables(own: Mapping[str, Iterable[Parameter]], joints: Sequence[Joint]) -> dict[str, Any]:

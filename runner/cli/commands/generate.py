@@ -93,6 +93,8 @@ def _command(name: str, description: str, default: Any = ...) -> Callable[..., N
                 raise typer.Exit(1)
         else:
             _write(name, output, files, manifest, force, as_json)
+            if not as_json:
+                say(export.system.arm.told)
 
     command.__doc__ = description
     return command

@@ -12,7 +12,7 @@ from springline.model.control.reaching import reaching_rate
 from springline.model.control.sliding import surface
 from springline.model.control.terminal_sliding import TerminalSliding
 from springline.model.drive import DRIVES
-from springline.model.lagrange import equations_of_motion
+from springline.model.dynamics import equations_of_motion
 from springline.model.parameters import Values
 from springline.model.structure import Structure
 from springline.model.system import System
