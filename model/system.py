@@ -33,9 +33,9 @@ from springline.model.control import (
     fast_control,
 )
 from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
+from springline.model.dynamics import EquationsOfMotion, equations_of_motion
 from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
-from springline.model.dynamics import EquationsOfMotion, equations_of_motion
 from springline.model.mechanisms import MECHANISMS, Mechanism, expect_plausible
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
 from springline.model.quantities import (

@@ -118,7 +118,7 @@ def test_wheel_metadata(dist: Path, wheel: set[str]) -> None:
     assert f"{folder}/licenses/LICENSE" in wheel
     required = {line.split(";")[0].rstrip("0123456789.>=") for line in metadata.get_all("Requires-Dist", ())}
     assert {"casadi", "lazy_loader", "matplotlib", "numpy", "pyarrow", "pydantic", "scipy", "typer"} <= required
-    assert set(metadata.get_all("Provides-Extra", ())) == {"bench", "compiler", "dev", "distributed", "fmu"}
+    assert set(metadata.get_all("Provides-Extra", ())) == {"bench", "compiler", "dev", "distributed", "fmu", "verify"}
 
 
 def test_sdist_can_be_built_and_tested_from(sdist: set[str]) -> None:

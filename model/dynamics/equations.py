@@ -23,8 +23,7 @@ import casadi as ca
 from springline.model.base import BaseMotion
 from springline.model.dynamics import newton_euler, rigid_bodies
 from springline.model.dynamics.lagrange import energies_of
-from springline.model.mechanisms import Mechanism
-from springline.model.mechanisms.link import aligned
+from springline.model.mechanisms import Mechanism, aligned
 from springline.model.parameters import Values
 from springline.model.symbolic import TooManyTerms, collect, operations
 
@@ -62,7 +61,10 @@ class EquationsOfMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Terms:
-    """Of symbols q, dq, omega, alpha, force; `moving` of all five, `excess` is what the base adds, of the force's excess."""
+    """Of the symbols q, dq, omega, alpha and force.
+
+    excess  what the base adds, where force is what it has above that at rest;  moving: all of it
+    """
 
     mass: ca.SX
     coriolis: ca.SX

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from springline.model.mechanisms.link import Segment, outwards
+from springline.model.mechanisms import Segment, outwards
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,13 +103,13 @@ def mass_matrix(segments: Sequence[Segment], q: ca.SX) -> ca.SX:
             push, turn = m.mass * axis, ca.cross(m.first, axis)
         at = i
         while True:
-            s = segments[at]
-            entries[i][at] = entries[at][i] = ca.dot(s.axis, turn if s.revolute else push)
-            if s.parent < 0:
+            bearer = segments[at]
+            entries[i][at] = entries[at][i] = ca.dot(bearer.axis, turn if bearer.revolute else push)
+            if bearer.parent < 0:
                 break
-            push, turn = (s.frame @ (turns[at] @ v) for v in (push, turn))
-            turn = turn + ca.cross(s.place(q[at]), push)
-            at = s.parent
+            push, turn = (bearer.frame @ (turns[at] @ v) for v in (push, turn))
+            turn = turn + ca.cross(bearer.place(q[at]), push)
+            at = bearer.parent
     return ca.blockcat(entries)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from springline.model.mechanisms.body import Solid, turning
+from springline.model.mechanisms import Solid, turning
 
 
 def mass_matrix(bodies: Sequence[Solid], q: ca.SX) -> ca.SX:

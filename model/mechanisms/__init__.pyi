@@ -1,5 +1,10 @@
 from .body import Body as Body
+from .body import Solid as Solid
+from .body import turning as turning
 from .link import Link as Link
+from .link import Segment as Segment
+from .link import aligned as aligned
+from .link import outwards as outwards
 from .mechanism import Mechanism as Mechanism
 from .plausible import expect_plausible as expect_plausible
 from .registry import MECHANISMS as MECHANISMS

@@ -73,9 +73,9 @@ def matrix(owner: str, what: str, value: object, symbols: Sequence[ca.SX]) -> ca
     """A 3 x 3 matrix, dense. Raises ValueError."""
     given = stacked(value)
     shape = given.shape if isinstance(given, ca.SX | ca.DM) else None
-    if shape != (3, 3):
+    if not isinstance(given, ca.SX | ca.DM) or shape != (3, 3):
         raise ValueError(f"{owner}: {what}: expected 3 x 3, got {f'{shape[0]} x {shape[1]}' if shape else repr(value)}")
-    return ca.reshape(column(owner, what, ca.vec(given), 9, symbols), 3, 3)
+    return ca.reshape(column(owner, what, ca.vec(ca.SX(given)), 9, symbols), 3, 3)
 
 
 def inertia_matrix(owner: str, value: object, symbols: Sequence[ca.SX]) -> tuple[ca.SX, bool]:

@@ -98,14 +98,18 @@ def segments_of(links: object, joints: Sequence[str], owner: str, symbols: Seque
     if not isinstance(links, list | tuple) or not all(isinstance(link, Link) for link in links):
         raise ValueError(f"{owner}: links: expected a list of Link, got {links!r}")
     if len(links) != len(joints):
-        raise ValueError(f"{owner}: links: expected {len(joints)}, one per joint ({', '.join(joints)}), got {len(links)}")
+        raise ValueError(
+            f"{owner}: links: expected {len(joints)}, one per joint ({', '.join(joints)}), got {len(links)}"
+        )
     made = tuple(_segment(link, len(links), f"{owner}: link {link.name!r}", symbols) for link in links)
     for start in made:
         seen, at = [start.name], start.parent
         while at >= 0:
             seen.append(made[at].name)
             if len(seen) > len(made):
-                raise ValueError(f"{owner}: links: {' -> '.join(seen)} is a circle, expected a tree with its root at -1")
+                raise ValueError(
+                    f"{owner}: links: {' -> '.join(seen)} is a circle, expected a tree with its root at -1"
+                )
             at = made[at].parent
     return made
 
@@ -122,9 +126,16 @@ def aligned(segments: Sequence[Segment]) -> tuple[Segment, ...]:
         outer = into[s.parent].T if s.parent >= 0 else ca.SX.eye(3)
         origin, frame, com = outer @ s.origin, outer @ s.frame @ own, own.T @ s.com
         axis = s.axis if _along_one(s.axis) else ca.SX([0, 0, 1])
-        inertia = own.T @ s.inertia @ own
-        moved = {"origin": origin, "frame": frame, "com": com, "axis": axis, "inertia": inertia}
-        result.append(replace(s, **{name: ca.densify(value) for name, value in moved.items()}))
+        result.append(
+            replace(
+                s,
+                origin=ca.densify(origin),
+                frame=ca.densify(frame),
+                com=ca.densify(com),
+                axis=axis,
+                inertia=ca.densify(own.T @ s.inertia @ own),
+            )
+        )
     return tuple(result)
 
 
@@ -143,6 +154,7 @@ def _basis(axis: ca.SX) -> ca.SX:
 
 def outwards(segments: Sequence[Segment]) -> list[int]:
     """Indices of the links, each after its parent."""
+
     def depth(i: int) -> int:
         return 0 if i < 0 else 1 + depth(segments[i].parent)
 
@@ -221,5 +233,6 @@ def bodies_of(segments: Sequence[Segment], q: ca.SX) -> list[Solid]:
             ca.densify(rotation @ segment.frame @ segment.turn(q[i])),
         )
     return [
-        Solid(s.mass, frames[i][0] + frames[i][1] @ s.com, frames[i][1], s.inertia, s.planar) for i, s in enumerate(segments)
+        Solid(s.mass, frames[i][0] + frames[i][1] @ s.com, frames[i][1], s.inertia, s.planar)
+        for i, s in enumerate(segments)
     ]

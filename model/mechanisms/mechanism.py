@@ -80,8 +80,10 @@ class Mechanism:
 
     def bodies(self, q: ca.SX, p: Values) -> Sequence[Body]:
         """The bodies that the arm consists of, for joint coordinates q (n x 1); those of `links` unless said."""
-        return [Body(s.mass, s.position, s.rotation, s.inertia[2, 2] if s.planar else s.inertia)
-                for s in bodies_of(self.segments(p), q)]
+        return [
+            Body(s.mass, s.position, s.rotation, s.inertia[2, 2] if s.planar else s.inertia)
+            for s in bodies_of(self.segments(p), q)
+        ]
 
     def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX:
         """T, J, seen from a frame that moves with the base origin.

@@ -1,4 +1,4 @@
-"""A planar arm of n revolute joints that turn about the base's z axis; one joint is Spong's flexible-joint benchmark."""
+"""A planar arm of n revolute joints that turn about the base's z axis; one is Spong's flexible-joint benchmark."""
 
 from __future__ import annotations
 

@@ -404,7 +404,9 @@ class Scenario:
 
         What differs from joint to joint stays a list, which is found to have too few or too many entries.
         """
-        spread = {name: _without_equal(document[name]) for name in ("mechanism", "drive", "plant", "control", "initial")}
+        spread = {
+            name: _without_equal(document[name]) for name in ("mechanism", "drive", "plant", "control", "initial")
+        }
         name = self.structure().mechanism
         kept = {joint.name for joint in MECHANISMS[name].of_size(size_given(name, {schema.SIZE: size})).joints}
         gone = {joint.name for joint in self.system().joints} - kept

@@ -42,8 +42,10 @@ class Derived:
 
     def terms(self, q, dq, omega=(0, 0, 0), alpha=(0, 0, 0), force=(0, 9.81, 0), numbers: Mapping[str, float] = {}):
         p = [numbers.get(name, default) for name, default in zip(self.names, self.defaults, strict=True)]
-        return {name: np.array(value).squeeze(axis=1) if value.shape[1] == 1 and name != "mass" else np.array(value)
-                for name, value in self.function(q=q, dq=dq, w=omega, a=alpha, f=force, p=p).items()}
+        return {
+            name: np.array(value).squeeze(axis=1) if value.shape[1] == 1 and name != "mass" else np.array(value)
+            for name, value in self.function(q=q, dq=dq, w=omega, a=alpha, f=force, p=p).items()
+        }
 
 
 @pytest.fixture(scope="session")
@@ -96,7 +98,9 @@ def chain(kinds, frames="generic", parents=None) -> Mechanism:
                 return Link(f"l{k}", joint, parent, three("o"), three("t"), three("u"), p[f"m{k}"], three("c"), inertia)
             turn, place = ((np.pi / 2) * (-1) ** k, 0, 0), (0, p[f"o{k}y"], 0)
             diagonal = [[inertia[a][b] if a == b else 0 for b in range(3)] for a in range(3)]
-            return Link(f"l{k}", joint, parent, place, turn, (0, 0, 1), p[f"m{k}"], (0, p[f"c{k}y"], p[f"c{k}z"]), diagonal)
+            return Link(
+                f"l{k}", joint, parent, place, turn, (0, 0, 1), p[f"m{k}"], (0, p[f"c{k}y"], p[f"c{k}z"]), diagonal
+            )
 
     return Chain()
 
@@ -106,7 +110,11 @@ def numbers_for(n, rng) -> dict[str, float]:
     found = {}
     for k in range(n):
         for name in "xyz":
-            found |= {f"o{k}{name}": rng.normal(0, 0.4), f"t{k}{name}": rng.uniform(-3, 3), f"c{k}{name}": rng.normal(0, 0.2)}
+            found |= {
+                f"o{k}{name}": rng.normal(0, 0.4),
+                f"t{k}{name}": rng.uniform(-3, 3),
+                f"c{k}{name}": rng.normal(0, 0.2),
+            }
             found[f"u{k}{name}"] = rng.normal()
         found[f"m{k}"] = rng.uniform(0.5, 5.0)
         inertia = inertia_of(rng)

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from springline.model.mechanisms import MECHANISMS, Body, Link, Mechanism
-from springline.model.mechanisms.transfer_manipulator import TransferManipulator
 from springline.model.structure import SignalShape, Structure
+from springline.model.symbolic import operations
 from springline.model.system import System
+
+TransferManipulator: type[Mechanism] = type(MECHANISMS["transfer_manipulator"])
 
 
 class AsBodies(TransferManipulator):
@@ -79,13 +81,21 @@ def test_an_energy_may_add_to_what_bodies_say(derive):
     np.testing.assert_allclose(sprung["mass"], plain["mass"], rtol=1e-12)
 
 
+def said_anew(mechanism, method):
+    """A mechanism whose class has a method of its own, which does what the inherited one does."""
+
+    def own(self, *given):
+        return getattr(super(made, self), method)(*given)
+
+    made = type(f"With_{method}", (type(mechanism),), {method: own})
+    return made()
+
+
 @pytest.mark.parametrize("kinds", ["rr", "rp", "prr", "rrr"])
 def test_a_chain_is_one_chain_however_it_is_said(derive, make_chain, make_numbers, kinds):
     """Recursion, projection of its bodies, and Lagrange's equations of their energies."""
     tree = make_chain(kinds)
-    bodies = type("Bodies", (type(tree),), {"name": "b", "bodies": lambda self, q, p: Mechanism.bodies(self, q, p)})()
-    energy = {"kinetic_energy": lambda self, q, dq, w, p: Mechanism.kinetic_energy(self, q, dq, w, p)}
-    energies = type("Energies", (type(tree),), {"name": "e", **energy})()
+    bodies, energies = said_anew(tree, "bodies"), said_anew(tree, "kinetic_energy")
     assert [arm.said_as for arm in (tree, bodies, energies)] == ["links", "bodies", "energies"]
     rng = np.random.default_rng(len(kinds))
     numbers, state = make_numbers(len(kinds), rng), random_state(rng, len(kinds))
@@ -132,8 +142,6 @@ def test_the_form_is_the_cheaper_one():
 
 def operations_of_plant(system):
     """Arithmetic operations of one evaluation of the plant that do not depend on parameters alone."""
-    from springline.model.symbolic import operations
-
     plant = system.function("plant")
     symbols = [ca.SX.sym(plant.name_in(i), plant.size1_in(i)) for i in range(plant.n_in())]
     return operations(plant(*symbols), ca.vertcat(*symbols), ca.vertcat(*symbols[:-1]))
@@ -155,7 +163,10 @@ def test_seven_joints_in_space_stay_small(make_chain, monkeypatch, frames, most)
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"origin": (0.3, 0, 0)}, "link 'a': origin: expected 0, 1, -1 or an expression of parameters, which the class"),
+        (
+            {"origin": (0.3, 0, 0)},
+            "link 'a': origin: expected 0, 1, -1 or an expression of parameters, which the class",
+        ),
         ({"mass": 2.0}, "link 'a': mass: expected 0, 1, -1 or an expression of parameters"),
         ({"inertia": 0.5}, "link 'a': inertia: expected 0, 1, -1 or"),
         ({"rpy": (0.3, 0, 0)}, "link 'a': rpy: expected whole multiples of pi/2"),

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from springline.model.dynamics import equations_of_motion
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import ParameterVector
 from springline.model.structure import SignalShape, Structure
@@ -78,7 +77,7 @@ def mujoco_model(mujoco, links, g):
         body = body.add_body(name=name, **stand_in)
         body.add_joint(name=name, type=_joint(mujoco, kind == "r"), axis=axis)
     bodies = {-1: body}
-    for i, (revolute, parent, origin, frame, axis, mass, com, inertia) in enumerate(links):
+    for i, (revolute, parent, origin, frame, axis, _, com, _) in enumerate(links):
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, np.ascontiguousarray(frame).ravel())
         bodies[i] = bodies[parent].add_body(name=f"b{i}", pos=origin, quat=quat, ipos=com, **stand_in)
@@ -102,7 +101,7 @@ def ours(structure, numbers):
     """(b, db, ddb, q, dq) -> M, C dq, G and what holds ddq at zero, of the system's own functions."""
     system = System(structure)
     p, n, m = parameters(system, numbers), system.n, len(BASE)
-    b, db, ddb, q, dq = symbols = [ca.SX.sym(name, size) for name, size in zip("bvaqd", (m, m, m, n, n), strict=True)]
+    *_, q, dq = symbols = [ca.SX.sym(name, size) for name, size in zip("bvaqd", (m, m, m, n, n), strict=True)]
     coriolis, gravity = system.function("coriolis")(q, dq, p), system.function("gravity")(q, p)
     bias = coriolis + gravity - system.function("base_disturbance")(*symbols, p)
     function = ca.Function("terms", symbols, [system.function("mass_matrix")(q, p), coriolis, gravity, bias])
@@ -199,7 +198,9 @@ def test_an_open_loop_of_the_elastic_plant(pin, arm):
     p = parameters(system, numbers)
     keys = [slot.key for slot in system.slots]
     values = {key: p[k] for k, key in enumerate(keys) if key.startswith("plant.")}
-    declared = {what: [item.name for item in getattr(system.mechanism, what)] for what in ("motor_inertia", "stiffness")}
+    declared = {
+        what: [item.name for item in getattr(system.mechanism, what)] for what in ("motor_inertia", "stiffness")
+    }
     rotor, spring = (
         np.array([v for name in declared[what] for key, v in values.items()
                   if key == f"plant.{name}" or key.startswith(f"plant.{name}.")])
@@ -208,7 +209,11 @@ def test_an_open_loop_of_the_elastic_plant(pin, arm):
     amplitude, omega = np.array([0.3, 0.1, 0.15]), np.array([1.1, 0.9, 0.7])
 
     def base(t):
-        return amplitude * np.sin(omega * t), amplitude * omega * np.cos(omega * t), -amplitude * omega**2 * np.sin(omega * t)
+        return (
+            amplitude * np.sin(omega * t),
+            amplitude * omega * np.cos(omega * t),
+            -amplitude * omega**2 * np.sin(omega * t),
+        )
 
     def command(t):
         return 3.0 * np.sin(np.arange(1, n + 1) + 2.0 * t)

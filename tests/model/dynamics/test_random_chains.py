@@ -38,7 +38,9 @@ def system_of(make_chain, make_numbers):
 def test_the_mass_matrix_is_one(derive, make_chain, make_numbers, kinds, frames, seed):
     rng = np.random.default_rng(seed)
     numbers = make_numbers(len(kinds), rng)
-    mass = derive(make_chain(kinds, frames), "factored").terms(*rng.normal(size=(2, len(kinds))), numbers=numbers)["mass"]
+    mass = derive(make_chain(kinds, frames), "factored").terms(*rng.normal(size=(2, len(kinds))), numbers=numbers)[
+        "mass"
+    ]
     np.testing.assert_allclose(mass, mass.T, rtol=0, atol=1e-12 * np.abs(mass).max())
     assert np.linalg.eigvalsh(mass)[0] > 0
 
@@ -61,7 +63,7 @@ def test_power_balance(system_of, kinds, frames, seed):
 @settings(max_examples=8)
 @given(kinds=KINDS, frames=FRAMES, seed=SEEDS)
 def test_what_a_moving_base_does(system_of, kinds, frames, seed):
-    """S against a free derivation: kinetic energy of points in the inertial frame, by Lagrange with the base as time."""
+    """S against another derivation: energies in the inertial frame, by Lagrange, the base's motion given over time."""
     system, p, rng = system_of(kinds, frames, seed)
     n, m = len(kinds), system.base.b.numel()
     q, dq, t = ca.SX.sym("q", n), ca.SX.sym("dq", n), ca.SX.sym("t")
