@@ -117,7 +117,7 @@ def test_wheel_metadata(dist: Path, wheel: set[str]) -> None:
     assert dict(scripts["springline.commands"]) == {"bench": "springline.benchmarks.command:bench"}
     assert f"{folder}/licenses/LICENSE" in wheel
     required = {line.split(";")[0].rstrip("0123456789.>=") for line in metadata.get_all("Requires-Dist", ())}
-    assert {"casadi", "lazy_loader", "matplotlib", "numpy", "pyarrow", "pydantic", "scipy", "typer"} <= required
+    assert {"casadi", "jinja2", "lazy_loader", "matplotlib", "numpy", "pyarrow", "pydantic", "scipy", "typer"} <= required
     assert set(metadata.get_all("Provides-Extra", ())) == {"bench", "compiler", "dev", "distributed", "fmu"}
 
 
