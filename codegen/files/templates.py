@@ -2,7 +2,7 @@
 
 A template shows the file that is made of it. What depends on the length of names is laid out by filters, used as blocks
 ({% filter aligned %} … {% endfilter %}): `wrap` and `comment` fill lines with words, `aligned` puts the comments behind
-declarations in a column, `fitted` breaks C that is too long. `quoted` is a C string over as many lines as it needs.
+declarations in a column, `fitted` does so too and breaks C that is too long. `quoted` is a C string over as many lines as it needs.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, select_autoesca
 LINE = 100
 """Longest line of generated C, in characters."""
 
-_NARROWEST = 30  # columns that a comment behind a declaration needs; with less it stands above
+_NARROWEST = 20  # columns that a comment behind a declaration needs; with less it stands above
 _DECLARATION = re.compile(r"( *)(?!/\*)(\S.*?) +/\* (.*) \*/")
 _COMMENT = re.compile(r"( *)/\* (.*) \*/")
 _WHOLE = re.compile(r'"(?:[^"\\]|\\.)*"|/\*.*?\*/')  # nothing breaks inside a string or a comment
@@ -39,8 +39,13 @@ def render(folder: str, template: str, **values: Any) -> str:
 @cache
 def _environment(folder: str) -> Environment:
     templates = resources.files(folder) / "templates"
+
+    def load(name: str) -> tuple[str, str, None]:
+        """Text, and the file that an error message names."""
+        return (templates / name).read_text(encoding="utf-8"), str(templates / name), None
+
     environment = Environment(
-        loader=FunctionLoader(lambda name: (templates / name).read_text(encoding="utf-8")),
+        loader=FunctionLoader(load),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -73,9 +78,10 @@ def comment(text: str, indent: int = 0) -> str:
 
 def aligned(text: str) -> str:
     """Lines of C: the comments behind declarations that follow each other begin in one column."""
+    stripped = [line.rstrip() for line in text.strip("\n").splitlines()]
     lines: list[str] = []
-    for declare, run in groupby(text.strip("\n").split("\n"), lambda line: _DECLARATION.fullmatch(line) is not None):
-        lines += _column(list(run)) if declare else run
+    for declare, run in groupby(stripped, lambda line: _DECLARATION.fullmatch(line) is not None):
+        lines.extend(_column(list(run)) if declare else run)
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -85,7 +91,7 @@ def _column(lines: list[str]) -> Iterator[str]:
     room = LINE - column - len("/*  */")
     for match in run:
         declaration = match[1] + match[2]
-        if room < _NARROWEST:
+        if room < max(_NARROWEST, *map(len, match[3].split())):
             yield from comment(match[3], len(match[1])).splitlines()
             yield declaration
             continue
@@ -106,22 +112,30 @@ def _broken(line: str) -> Iterator[str]:
         yield from comment(alone[2], len(alone[1])).splitlines()
         return
     indent = len(line) - len(line.lstrip()) + 4
+    mark = " \\" if line.startswith("#") else ""  # a directive ends with its line
     while len(line) > LINE:
         whole = [match.span() for match in _WHOLE.finditer(line)]
-        ends = [
-            i
-            for i in range(indent, LINE + 1)
-            if (line[i] == " " or line[i - 1] == "(") and not any(start < i < end for start, end in whole)
-        ]
-        if not ends:
+        end = next(
+            (
+                i
+                for i in range(LINE - len(mark), indent, -1)
+                if (line[i] == " " or line[i - 1] == "(") and not any(start < i < stop for start, stop in whole)
+            ),
+            None,
+        )
+        if end is None:
             break
-        yield line[: ends[-1]].rstrip()
-        line = " " * indent + line[ends[-1] :].lstrip()
+        yield line[:end].rstrip() + mark
+        line = " " * indent + line[end:].lstrip()
     yield line
 
 
 def quoted(text: str, indent: int) -> str:
-    """A C string literal, over as many lines as it needs; `indent` is the column of its first character."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    words = textwrap.wrap(escaped, LINE - indent - 4, break_long_words=False, break_on_hyphens=False)
-    return f"\n{' ' * indent}".join(f'"{part}{" " if part is not words[-1] else ""}"' for part in words)
+    """A C string literal, over as many lines as it needs.
+
+    text    what stands between the quotes, escaped as C wants it
+    indent  column of the first quote
+    """
+    words = textwrap.wrap(text, LINE - indent - 4, break_long_words=False, break_on_hyphens=False)
+    parts = [*(f"{part} " for part in words[:-1]), *words[-1:]]
+    return f"\n{' ' * indent}".join(f'"{part}"' for part in parts)
