@@ -167,9 +167,7 @@ class TypedInterface:
                 joint.name,
                 self._is_unlimited(f"control.U_max.{k}"),
                 a_law,
-                self._parameter(f"control.a_max.{k}")
-                if a_law and not self._is_unlimited(f"control.a_max.{k}")
-                else "",
+                self._parameter(f"control.a_max.{k}") if a_law and not self._is_unlimited(f"control.a_max.{k}") else "",
             )
             for k, (joint, a_law) in enumerate(zip(system.joints, laws, strict=True))
         ]
