@@ -97,6 +97,9 @@ def test_wheel_carries_every_shipped_file(wheel: set[str]) -> None:
     assert shipped == tree(*PACKAGES) | FACE
     for needed in (
         "codegen/runtime/loop.c",
+        "codegen/export/c/templates/springline.h.j2",
+        "codegen/export/fmu/templates/index.html.j2",
+        "runner/report/templates/report.html.j2",
         "runner/scenarios/paper/nominal.toml",
         "generated/manifest.json",
     ):
@@ -117,7 +120,17 @@ def test_wheel_metadata(dist: Path, wheel: set[str]) -> None:
     assert dict(scripts["springline.commands"]) == {"bench": "springline.benchmarks.command:bench"}
     assert f"{folder}/licenses/LICENSE" in wheel
     required = {line.split(";")[0].rstrip("0123456789.>=") for line in metadata.get_all("Requires-Dist", ())}
-    assert {"casadi", "jinja2", "lazy_loader", "matplotlib", "numpy", "pyarrow", "pydantic", "scipy", "typer"} <= required
+    assert {
+        "casadi",
+        "jinja2",
+        "lazy_loader",
+        "matplotlib",
+        "numpy",
+        "pyarrow",
+        "pydantic",
+        "scipy",
+        "typer",
+    } <= required
     assert set(metadata.get_all("Provides-Extra", ())) == {"bench", "compiler", "dev", "distributed", "fmu"}
 
 

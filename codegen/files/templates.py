@@ -1,8 +1,9 @@
 """Generated text: Jinja2 templates, which stand in `templates/` beside the code that fills them.
 
 A template shows the file that is made of it. What depends on the length of names is laid out by filters, used as blocks
-({% filter aligned %} … {% endfilter %}): `wrap` and `comment` fill lines with words, `aligned` puts the comments behind
-declarations in a column, `fitted` does so too and breaks C that is too long. `quoted` is a C string over as many lines as it needs.
+({% filter fitted %} … {% endfilter %}): `wrap` and `comment` fill lines with words, `aligned` puts the comments behind
+declarations in a column, `fitted` does so too and breaks C that is too long. `quoted` is a C string, if need be of
+several lines.
 """
 
 from __future__ import annotations
@@ -81,7 +82,8 @@ def aligned(text: str) -> str:
     stripped = [line.rstrip() for line in text.strip("\n").splitlines()]
     lines: list[str] = []
     for declare, run in groupby(stripped, lambda line: _DECLARATION.fullmatch(line) is not None):
-        lines.extend(_column(list(run)) if declare else run)
+        block = list(run)
+        lines += _column(block) if declare else block
     return "".join(f"{line}\n" for line in lines)
 
 

@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 from springline.codegen.export.bound import bind
 from springline.codegen.export.c.statuses import STATUS
 from springline.codegen.export.c.tree import generate_files
-from springline.codegen.files import templates
 from springline.codegen.files.manifest import write_tree
 from springline.codegen.kernel.compiled import kernel
 from springline.codegen.kernel.settings import LoopSettings
