@@ -121,7 +121,9 @@ def _broken(line: str) -> Iterator[str]:
             (
                 i
                 for i in range(LINE - len(mark), indent, -1)
-                if (line[i] == " " or line[i - 1] == "(") and not any(start < i < stop for start, stop in whole)
+                if (line[i] == " " or line[i - 1] == "(")
+                and not line.endswith("return", 0, i)  # it stays with its value
+                and not any(start < i < stop for start, stop in whole)
             ),
             None,
         )

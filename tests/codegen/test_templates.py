@@ -163,6 +163,10 @@ def test_c_is_broken_where_a_word_ends() -> None:
     assert fitted(f"{'f' * 60}({'g' * 60});\n") == f"{'f' * 60}(\n    {'g' * 60});\n"
 
 
+def test_return_stays_with_its_value() -> None:
+    assert fitted(f"  if ({'a' * 50}) return {'b' * 40};\n") == f"  if ({'a' * 50})\n      return {'b' * 40};\n"
+
+
 def test_a_string_is_continued() -> None:
     assert quoted("some words", 10) == '"some words"'
     assert quoted("word " * 17 + "12345", 10) == '"' + "word " * 17 + '"\n          "12345"'
