@@ -284,9 +284,7 @@ def _columns(table: dict[str, Any], name: str, units: Mapping[str, str], folder:
     ]
 
 
-def _load_table(
-    table: Mapping[str, Any], name: str, time: Column, channels: Sequence[Column], where: str
-) -> TableRead:
+def _load_table(table: Mapping[str, Any], name: str, time: Column, channels: Sequence[Column], where: str) -> TableRead:
     """The signal table that [reference] or [base_motion] asks for."""
     path, key = table["path"], f"{name}.path"
     data = read_signal_file(path, where, key)

@@ -96,22 +96,22 @@ def read_samples(data: bytes, file: str, columns: Sequence[Column], where: str, 
     """
     header, rows = _rows(data, file, columns, where, key)
     wanted = [header.index(column.name) for column in columns]
-    units = [rows.pop(0)[1][i] for i in wanted] if rows and _names_units(rows[0][1]) else []
-    notes = _unit_notes(units, file, columns, where)
+    notes = []
+    if rows and _names_units(rows[0][1]):
+        notes = _unit_notes([rows[0][1][i] for i in wanted], file, columns, where)
+        del rows[0]
     lines = [line for line, _ in rows]
     numbers = np.empty((len(rows), len(columns)))
     digits, problems = [], []
     for i, column in enumerate(columns):
         cells = [row[wanted[i]] for _, row in rows]
-        matches = list(map(_NUMBER.fullmatch, cells))
-        values = [float(cell) if match else math.nan for cell, match in zip(cells, matches, strict=True)]
-        bad = next((k for k, value in enumerate(values) if not math.isfinite(value)), None)
+        bad = next((k for k, cell in enumerate(cells) if not _NUMBER.fullmatch(cell) or math.isinf(float(cell))), None)
         if bad is not None:
             place = f"{file}, line {lines[bad]}, column {column.name!r}"
             problems.append(Problem(where, column.key, f"{place}: {_number_expected(cells[bad])}", repr(cells[bad])))
             continue
-        numbers[:, i] = values
-        digits.append(_digit({match.groups() for match in matches if match}) * column.factor)
+        numbers[:, i] = list(map(float, cells))
+        digits.append(_digit(cells) * column.factor)
     if problems:
         raise InputError(*problems)
     notes += [note for i, column in enumerate(columns) if (note := _unwrap(numbers[:, i], lines, file, column))]
@@ -226,7 +226,7 @@ def _names_units(row: list[str]) -> bool:
 def _unit_notes(cells: list[str], file: str, columns: Sequence[Column], where: str) -> list[str]:
     """Notes on units that are not known. Raises InputError for those that the scenario does not read the column in."""
     notes, problems = [], []
-    for cell, column in zip(cells, columns, strict=bool(cells)):
+    for cell, column in zip(cells, columns, strict=True):
         told = cell.strip(" \t#[]()")
         unit = _SPELLED.get(told.lower(), told)
         if not column.unit or unit in ("", "-", column.unit):
@@ -247,11 +247,12 @@ def _unit_notes(cells: list[str], file: str, columns: Sequence[Column], where: s
     return notes
 
 
-def _digit(numbers: set[tuple[str, str | None]]) -> float:
-    """What the last digit of numbers, given as mantissa and exponent, is worth, at most 1."""
-    least = 0.0
-    for mantissa, exponent in numbers:
-        least = min(least, float((exponent or "e0")[1:]) - len(mantissa.partition(".")[2]))
+def _digit(numbers: Sequence[str]) -> float:
+    """What the last digit of numbers is worth, at most 1."""
+    text = " ".join(numbers)  # of which there may be millions: a search in one text is soon done
+    least = -float(max(map(len, re.findall(r"\.([0-9]*)(?:\s|\Z)", text)), default=0))
+    for places, exponent in re.findall(r"(?:\.([0-9]*))?[eE]([+-]?[0-9]+)", text):
+        least = min(least, float(exponent) - len(places))
     return float(10.0**least)
 
 

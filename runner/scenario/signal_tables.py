@@ -3,20 +3,19 @@
 The loop wants samples at equal steps. What the rows' times are decides how it gets them:
 
     uniform   as far as doubles tell: the rows are the samples
-    rounded   30 or 60 Hz written in ms, say: every time is that of a uniform grid up to its last digit. The rows are the
-              samples here, too. Through the times as written, the rounding would be in the motion: at 30 Hz, a swell of
-              10 s and 1 m (0.39 m/s^2 at most) would have accelerations of 1.5 m/s^2
+    rounded   30 or 60 Hz written in ms, say: every time is that of a uniform grid up to its last digit. The rows are
+              the samples here, too. Through the times as written, their rounding would be in the motion: at 30 Hz, a
+              swell of 1 m and 10 s would have accelerations of up to 2 m/s^2, where it has 0.4
     any other the times are believed, and the cubic spline through the rows is sampled at the median interval
 
-The spline passes through every sample, with its noise, and the second derivative takes noise up with the squared sample
-rate. What the rows show of accelerations themselves are their second differences. Between samples a sine with n
-samples a period has 3 / (2 + cos(2 pi / n)) times those in the spline through it: 1.01 for 32, 1.14 for 8, and 3 for the
-fastest that there is. A spline that exceeds them markedly is made of motion that its samples hardly resolve.
+The spline passes through every sample, with its noise, and its second derivative takes noise up with the square of the
+sample rate. What the rows themselves show of accelerations are their second differences. Where a sine has n samples a
+period, the spline has 3 / (2 + cos(2 pi / n)) times these at the samples: 1.006 for 32, 1.11 for 8, 3 for the fastest
+that there is. A spline that exceeds them markedly is made of motion that its samples hardly resolve.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -38,8 +37,8 @@ _UNIFORM = 1e-6
 # The doubles of large times, such as Unix seconds, lie far apart: what they cannot tell, up to this much of a sample,
 # is no jitter either.
 _ROUNDED = 1e-3
-# Times that are rounded to no more than this much of a sample, and in at least so many rows, are told from a table whose
-# steps differ: by chance no such table keeps to a grid for that long.
+# Times rounded to no more than this much of a sample, in at least so many rows, are told from a table whose
+# steps do differ: by chance none keeps to a grid for that long.
 _COARSEST = 1 / 3
 _ENOUGH_ROWS = 20
 # A last row this near to the first (of the channel's range) repeats it.
@@ -200,11 +199,11 @@ def _expect_no_gap(t: Floats, lines: list[int], place: str, max_gap: float | Non
     if not over.size:
         return
     k = int(over[0])
-    limit = f"{most:.6g} s" + (f", {MAX_GAP:g} times the median interval" if max_gap is None else "")
-    more = f" (and {over.size - 1} more gaps)" if over.size > 1 else ""
+    limit = f"{most:.6g} s apart" + (f" ({MAX_GAP:g} times the median interval)" if max_gap is None else "")
+    more = f" (and {over.size - 1} more)" if over.size > 1 else ""
     text = (
-        f"{place.format(lines[k + 1])}: a gap from {t[k]:.15g} s (line {lines[k]}) to {t[k + 1]:.15g} s{more}: expected "
-        f"rows at most {limit}, apart (max_gap = {steps.max():.6g} bridges what there is by the spline)"
+        f"{place.format(lines[k + 1])}: a gap from {t[k]:.15g} s (line {lines[k]}) to {t[k + 1]:.15g} s{more}: "
+        f"expected rows at most {limit} (max_gap = {steps.max():.8g} bridges them all by the spline)"
     )
     raise InputError(Problem(where, key, text, f"{steps[k]:.6g} s"))
 

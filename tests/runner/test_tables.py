@@ -327,7 +327,8 @@ GOOD = rows(np.arange(6.0), np.zeros(6))
             GOOD.replace("3.0,", "2.0,"), ["line 5", "'t'", "repeats the time of line 4, 2 s"], id="repeated time"
         ),
         pytest.param(
-            GOOD.replace("3.0,", "1.5,"), ["line 5, column 't'", "later than that of line 4, 2 s", "got 1.5 s"],
+            GOOD.replace("3.0,", "1.5,"),
+            ["line 5, column 't'", "later than that of line 4, 2 s", "got 1.5 s"],
             id="earlier time",
         ),
         pytest.param(rows(-np.arange(6.0), np.zeros(6)), ["line 3", "increasing", "got -1 s"], id="backwards"),
