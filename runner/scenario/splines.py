@@ -161,7 +161,7 @@ def resampled(t: Floats, samples: Floats, intervals: int, ends: Ends) -> Floats:
     return result
 
 
-def _cubic_spline(t: Floats, samples: Floats, ends: Ends) -> Any:
+def _cubic_spline(t: NDArray[np.floating[Any]], samples: Floats, ends: Ends) -> Any:
     # Here, because it takes longer to import than everything that a scenario without tables needs.
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 - slow to load, and only tables need it
 
