@@ -215,7 +215,7 @@ def _names_units(row: list[str]) -> bool:
 
     def like_a_number(cell: str) -> bool:
         try:
-            float(cell.replace(",", "."))
+            float(cell)
         except ValueError:
             return bool(re.match(r"\s*[+-]?[.,]?[0-9]+([:.,_-]|\s*$)", cell))
         return True

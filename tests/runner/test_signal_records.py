@@ -411,6 +411,14 @@ def test_a_clean_sine_is_no_noise(samples: int, ends: Ends, phase: float) -> Non
     assert inner == pytest.approx(ratio * differences, rel=5e-3)
 
 
+def test_where_a_period_closes_there_are_second_differences_too() -> None:
+    values = np.zeros(32)
+    values[0] = 1.0
+    found = read(written(np.arange(32) / 10, values), "periodic")
+    assert found.shown[0] == pytest.approx(2.0 / 0.1**2)
+    assert "(at 0 s)" in warnings(found)[0]  # which is a corner
+
+
 @pytest.mark.parametrize("jitter", [0.0, 0.1])
 def test_a_noisy_sine_is_told_with_what_its_rows_show(jitter: float) -> None:
     generator = np.random.default_rng(5)
@@ -460,6 +468,17 @@ def test_a_run_reports_accelerations_and_warns_on_stderr_alone(tmp_path: Path, m
     refusal = springline("run", "s.toml", "-o", "no", "--set", "base_motion.max_gap=0.01")
     assert refusal.exit_code == 2 and "m.csv, line 3, column 't': a gap from 0 s" in refusal.stderr
     assert not Path("no").exists()
+
+
+def test_a_units_row_is_held_against_the_units_of_the_scenario(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = PLAIN.replace("t,a", "t,a\ns,cm")
+    with pytest.raises(InputError, match=r"base_motion\.units\.shake: .*m\.csv has 'cm' .* reads m: say \"cm\" here"):
+        scenario_of(tmp_path, text)
+    plain = scenario_of(tmp_path, PLAIN, 'units = { shake = "cm" }')
+    assert scenario_of(tmp_path, text, 'units = { shake = "cm" }') == plain
+    refusal = springline("run", "s.toml", "-o", "no", "--set", "base_motion.units.shake=mm")
+    assert refusal.exit_code == 2 and "has 'cm' for column 'a', and the scenario reads mm" in refusal.stderr
 
 
 def test_the_packaged_record_is_clean() -> None:
