@@ -338,7 +338,7 @@ def test_lines_are_counted_as_an_editor_does(tmp_path: Path) -> None:
 
 
 def test_many_rows_are_read_in_seconds() -> None:
-    """100,000 rows of 7 columns: 2 s on an idle core, and nothing in it that grows faster than the rows."""
+    """100,000 of them: nothing in the reader grows faster than the rows do."""
     generator = np.random.default_rng(1)
     t = np.arange(100_000) / 100 + generator.uniform(-1e-3, 1e-3, 100_000)
     text = written(t, np.sin(t))
