@@ -8,6 +8,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 from springline.codegen.kernel import MOST_STEPS
 from springline.model.base import COORDINATES
 from springline.model.drive import DRIVES, DriveKind
@@ -16,7 +18,9 @@ from springline.model.parameters import POSITIVE
 from springline.runner.files import InputError, Problem, unknown
 from springline.runner.scenario import schema
 from springline.runner.scenario.locate import canonical_path, read_signal_file
-from springline.runner.scenario.splines import HALF_TURN, UNITS, Column, Ends, Spline, read_table
+from springline.runner.scenario.signal_csv import HALF_TURN, UNITS, Column
+from springline.runner.scenario.signal_tables import TableRead, excess_notes, read_table
+from springline.runner.scenario.splines import Ends, Spline
 from springline.runner.scenario.user_code import UserClass, canonical_reference, load_class, read_class
 
 Document = dict[str, dict[str, Any]]
@@ -91,10 +95,11 @@ def resolve(
             time, *channels = _columns(document[name], name, units[name], folder, where)
             if not read:
                 continue
-            table, remarks = _load_table(document[name], name, time, channels, where)
-            tables.append(table)
+            table = _load_table(document[name], name, time, channels, where)
+            tables.append(table.spline)
             if duration is not None:
-                notes += [*remarks, _expect_overlap(table, document[name], name, channels, duration, where)]
+                span = _expect_overlap(table.spline, document[name], name, channels, duration, where)
+                notes += [*table.notes, span, *_acceleration_notes(table, document[name], name, channels, units[name])]
         except InputError as error:
             problems += error.problems
     if problems:
@@ -281,19 +286,34 @@ def _columns(table: dict[str, Any], name: str, units: Mapping[str, str], folder:
             f"{name}.columns.{item}",
             UNITS.get(si[item], {}).get(unit, 1.0),
             HALF_TURN.get(unit, math.inf),
+            unit,
         )
         for item, unit in chosen.items()
     ]
 
 
-def _load_table(
-    table: Mapping[str, Any], name: str, time: Column, channels: Sequence[Column], where: str
-) -> tuple[Spline, list[str]]:
-    """The signal table that [reference] or [base_motion] asks for, with notes on it."""
+def _load_table(table: Mapping[str, Any], name: str, time: Column, channels: Sequence[Column], where: str) -> TableRead:
+    """The signal table that [reference] or [base_motion] asks for."""
     path, key = table["path"], f"{name}.path"
     data = read_signal_file(path, where, key)
     ends = cast(Ends, table["ends"])
-    return read_table(data, path, time, channels, ends, t0=table["t0"], where=where, key=key)
+    max_gap = table.get("max_gap")
+    return read_table(data, path, time, channels, ends, t0=table["t0"], max_gap=max_gap, where=where, key=key)
+
+
+def _acceleration_notes(
+    read: TableRead, table: Mapping[str, Any], name: str, channels: Sequence[Column], units: Mapping[str, str]
+) -> list[str]:
+    """A note on the largest accelerations of a record, and warnings of those that it does not show itself."""
+    names = [column.key.rpartition(".")[2] for column in channels]
+    of = [f"{units[item]}/s^2" for item in names]
+    largest = np.abs(read.spline.accelerations()).max(axis=0)
+    told = (
+        f"{item} {found:.3g} {unit} ({shown:.3g})"
+        for item, found, shown, unit in zip(names, largest, read.shown, of, strict=True)
+    )
+    note = f"{name}: the largest accelerations (and second differences of the rows) of {table['path']} are "
+    return [note + ", ".join(told), *excess_notes(read, channels, of, table["path"], table["t0"])]
 
 
 def _expect_overlap(

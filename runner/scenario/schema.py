@@ -25,7 +25,8 @@ from springline.model.registry import Registry
 from springline.model.structure import Structure
 from springline.model.system import control_parameters, own_control_tables
 from springline.runner.files import Problem, unknown, value_text
-from springline.runner.scenario.splines import ENDS, UNITS
+from springline.runner.scenario.signal_csv import UNITS
+from springline.runner.scenario.splines import ENDS
 
 Mode = Literal["continuous", "sampled"]
 Kind = Literal["none", "sine", "polynomial", "table"]
@@ -452,6 +453,7 @@ def _table_section(units: Mapping[str, str]) -> type[Section]:
             "units": (in_units, Field(default_factory=in_units)),
             "t0": (Annotated[float, number("s")], 0.0),
             "ends": (Annotated[str, choice("ends", ENDS)], ENDS[0]),
+            "max_gap": (Annotated[float | None, number("s", POSITIVE)], None),
         },
     )
 

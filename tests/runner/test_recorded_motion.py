@@ -162,14 +162,15 @@ def test_run_tells_the_span_and_writes_a_scenario_that_can_be_moved(
     """)
     shown = springline("run", "work/s.toml", "-o", "work/results", "--no-plot")
     assert shown.exit_code == 0
-    unwrapped, span = shown.stderr.splitlines()
+    unwrapped, span, largest = shown.stderr.splitlines()
     assert unwrapped.startswith("base_motion.columns.roll: column 'a' of ") and "line 4: " in unwrapped
     assert "m.csv lasts from 170 to 178 s, and the run takes 171.5 to 171.6 s of it" in span
     assert span.endswith(": less than one of its sample intervals of 1 s (is units.t right?)")
+    assert "the largest accelerations" in largest
     assert str(tmp_path) not in Path("work/results/scenario.toml").read_text()
     Path("work").rename("moved")
     again = springline("run", "moved/results/scenario.toml", "-o", "again", "--no-plot", "--json")
-    assert again.exit_code == 0 and len(again.stderr.splitlines()) == 2
+    assert again.exit_code == 0 and len(again.stderr.splitlines()) == 3
     assert json.loads(again.stdout)["status"] == "ok"
     for name in ("trajectory.parquet", "metrics.parquet"):
         assert Path("again", name).read_bytes() == Path("moved/results", name).read_bytes()

@@ -13,7 +13,9 @@ from numpy.polynomial.polynomial import polyder, polyval
 from springline.codegen.program import SignalTable
 from springline.runner.files import InputError
 from springline.runner.scenario import kernel_tables
-from springline.runner.scenario.splines import ENDS, HALF_TURN, UNITS, Column, Ends, Spline, read_table, spline
+from springline.runner.scenario.signal_csv import HALF_TURN, UNITS, Column
+from springline.runner.scenario.signal_tables import read_table
+from springline.runner.scenario.splines import ENDS, Ends, Spline, spline
 
 DATA = Path(__file__).parents[2] / "data"
 Knots = Spline | SignalTable
@@ -42,7 +44,8 @@ def read(
     factor, half_turn = UNITS["rad"].get(unit, 1.0), HALF_TURN.get(unit, math.inf)
     channels = [Column(name, f"reference.columns.{name}", factor, half_turn) for name in columns]
     time = Column("t", "reference.columns.t", seconds)
-    return read_table(text.encode(), "x.csv", time, channels, ends, where="s.toml", key="reference.path")
+    found = read_table(text.encode(), "x.csv", time, channels, ends, where="s.toml", key="reference.path")
+    return found.spline, found.notes
 
 
 def csv(text: str, ends: Ends = "error", columns: tuple[str, ...] = ("a",)) -> Spline:
@@ -186,7 +189,7 @@ def test_what_is_nearly_a_ramp_is_stopped_by_its_own_accelerations(dt: float, be
     turns = 0.2 * np.arange(30)
     record = rows(dt * np.arange(30), (1.5 * turns + bend * np.sin(turns)) / unit)
     channels = [Column("a", "reference.columns.a", unit)]
-    table, _ = read_table(record.encode(), "x.csv", Column("t", ""), channels, "hold", where="s.toml", key="")
+    table = read_table(record.encode(), "x.csv", Column("t", ""), channels, "hold", where="s.toml", key="").spline
     own = own_accelerations(table)
     assert own == pytest.approx(bend * (0.2 / dt) ** 2, rel=0.1)
     for intervals in table.rests():
@@ -303,7 +306,7 @@ def test_the_unit_of_a_column_is_applied() -> None:
     text = rows(np.arange(5.0) * 1000, np.full(5, 90.0), names="t,a")
     channels = [Column("a", "k", UNITS["rad"]["deg"])]
     time = Column("t", "t", UNITS["s"]["ms"])
-    table, _ = read_table(text.encode(), "x.csv", time, channels, "error", where="", key="")
+    table = read_table(text.encode(), "x.csv", time, channels, "error", where="", key="").spline
     assert table.dt == pytest.approx(1.0)
     assert table.coefficients[:, 0, 0] == pytest.approx(math.pi / 2)
 
@@ -321,10 +324,16 @@ GOOD = rows(np.arange(6.0), np.zeros(6))
         pytest.param(GOOD.replace("3.0,0.0", "3.0,three"), ["line 5", "'three'"], id="text"),
         pytest.param(GOOD.replace("3.0,0.0", "3.0,"), ["line 5", "''"], id="empty cell"),
         pytest.param(GOOD.replace("3.0,0.0", "3.0"), ["line 5", "expected 2 cells", "got 1"], id="short row"),
-        pytest.param(GOOD.replace("3.0,", "3.00001,"), ["line 5", "uniform", "resample"], id="jitter"),
-        pytest.param(GOOD.replace("3.0,", "2.0,"), ["line 5", "uniform"], id="repeated time"),
-        pytest.param(rows(-np.arange(6.0), np.zeros(6)), ["line 3", "increasing"], id="backwards"),
-        pytest.param(rows(np.zeros(6), np.zeros(6)), ["increasing"], id="no time passes"),
+        pytest.param(
+            GOOD.replace("3.0,", "2.0,"), ["line 5", "'t'", "repeats the time of line 4, 2 s"], id="repeated time"
+        ),
+        pytest.param(
+            GOOD.replace("3.0,", "1.5,"),
+            ["line 5, column 't'", "later than that of line 4, 2 s", "got 1.5 s"],
+            id="earlier time",
+        ),
+        pytest.param(rows(-np.arange(6.0), np.zeros(6)), ["line 3", "increasing", "got -1 s"], id="backwards"),
+        pytest.param(rows(np.zeros(6), np.zeros(6)), ["line 3", "repeats the time of line 2"], id="no time passes"),
         pytest.param(GOOD.replace("3.0,0.0", "3.0,1_000"), ["line 5", "'1_000'", "-1.5e-3"], id="underscore"),
         pytest.param(GOOD.replace("4.0,", "4_0.0,"), ["line 6", "'t'", "'4_0.0'"], id="underscore in a time"),
         pytest.param(GOOD.replace("3.0,0.0", "3.0,\u0661\u0662"), ["line 5", "a finite number"], id="other digits"),
@@ -341,7 +350,8 @@ GOOD = rows(np.arange(6.0), np.zeros(6))
         pytest.param(rows(1e-300 * np.arange(6.0), np.zeros(6)), ["'t'", "1e-50 s"], id="rows too near"),
         pytest.param(rows(np.arange(3.0), np.zeros(3)), ["at least 4 rows", "got 3"], id="too few rows"),
         pytest.param("t,a\n", ["at least 4 rows", "got 0"], id="no rows"),
-        pytest.param("", ["unknown column"], id="empty file"),
+        pytest.param("", ["is empty", "a header"], id="empty file"),
+        pytest.param(" \n\n,\n", ["is empty"], id="nothing but blanks"),
         pytest.param('t,a\n0,"1\n', ["no CSV file"], id="open quote"),
     ],
 )
@@ -382,7 +392,8 @@ def test_times_as_large_as_unix_seconds_are_uniform_enough(start: float, rate: i
 def test_jitter_is_found_however_large_the_times_are() -> None:
     t = 1.7e9 + np.arange(500) / 100
     t[77] += 1e-4
-    assert "line 79" in message(rows(t, np.zeros(500)))
+    _, (note,) = read(rows(t, np.zeros(500)))
+    assert "0.00990009 to 0.0100999 s apart" in note
 
 
 def test_a_product_of_cell_and_unit_that_overflows_is_told() -> None:
@@ -448,7 +459,7 @@ def test_derivatives_of_the_vessel_record_agree_with_its_inertial_measurement_un
     file = resources.files("springline.runner") / "scenarios" / "data" / "vessel_orcaflex_10hz.csv"
     names = ("surge", "sway", "heave", "roll", "pitch", "yaw")
     channels = [Column(name, name) for name in names]
-    table, _ = read_table(file.read_bytes(), "vessel", Column("time_s", "t"), channels, "error", where="", key="")
+    table = read_table(file.read_bytes(), "vessel", Column("time_s", "t"), channels, "error", where="", key="").spline
     imu = np.genfromtxt(DATA / "vessel_imu_60s.csv", delimiter=",", names=True)
     t = imu["time_s"]
     surge, sway, heave, *_ = evaluate(table, t, 2).T

@@ -1,0 +1,275 @@
+"""Signals as they stand in CSV files: the columns that a scenario names, as numbers in SI units, and where they stood.
+
+A file is read as it is written or refused with the remedy; what it may have meant is not guessed. The separator is a
+comma and the decimal sign a point. Rows whose cells are all empty say nothing and are passed over, and the row after
+the header may name units: it is held against the scenario's, and never read in their place.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springline.runner.files import InputError, Problem, unknown
+
+Floats = NDArray[np.float64]
+
+UNITS = {
+    "s": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3},
+    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0},
+}
+"""SI unit -> the units a column may have instead, and how much of the SI unit one of them is."""
+
+HALF_TURN = {"rad": math.pi, "mrad": 1e3 * math.pi, "deg": 180.0}
+"""Unit of an angle -> half a turn in it."""
+
+_KNOWN = frozenset(unit for units in UNITS.values() for unit in units)
+# Units in full, as a units row may have them.
+_SPELLED = {
+    **dict.fromkeys(("sec", "second", "seconds"), "s"),
+    **dict.fromkeys(("minute", "minutes"), "min"),
+    **dict.fromkeys(("metre", "metres", "meter", "meters"), "m"),
+    **dict.fromkeys(("radian", "radians"), "rad"),
+    **dict.fromkeys(("degree", "degrees", "°"), "deg"),
+}
+
+# A number as instruments and spreadsheets write it. What Python reads besides (1_000, digits of other scripts) is more
+# likely a damaged cell than a number.
+_NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*", re.ASCII)
+_WHOLE = re.compile(r"\s*[+-]?[0-9]+([eE][+-]?[0-9]+)?\s*", re.ASCII)
+_SEPARATORS = {"semicolons": ";", "tabs": "\t"}
+# How many lines a note names, and how many lines into the file a header is looked for.
+_MOST_LINES = 5
+_DEEPEST_HEADER = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a CSV file.
+
+    name, key  its name there, and the scenario key that asks for it
+    factor     its unit in SI units
+    half_turn  half a turn in its unit if it is an angle, else inf
+    unit       its unit by name, "" if that is of no interest
+    """
+
+    name: str
+    key: str
+    factor: float = 1.0
+    half_turn: float = math.inf
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Columns of a CSV file.
+
+    lines    where each row stands, from 1
+    numbers  (rows, columns), SI units; angles are unwrapped
+    digits   what the last digit of each column's numbers is worth, SI units
+    notes    what was made of the file, a sentence each
+    """
+
+    lines: list[int]
+    numbers: Floats
+    digits: list[float]
+    notes: list[str]
+
+
+def read_samples(data: bytes, file: str, columns: Sequence[Column], where: str, key: str) -> Samples:
+    """Read some columns of a CSV file with a header row.
+
+    data, file  the file's contents and its name for messages
+    where, key  the scenario file and the table that refer to it, for messages
+    Raises InputError for what is no such file: another encoding or separator, decimal commas, a column that is missing
+    or there twice, rows of another length, a cell that is no finite number, units that are not the scenario's.
+    """
+    header, rows = _rows(data, file, columns, where, key)
+    wanted = [header.index(column.name) for column in columns]
+    notes = []
+    if rows and _names_units(rows[0][1]):
+        notes = _unit_notes([rows[0][1][i] for i in wanted], file, columns, where)
+        del rows[0]
+    lines = [line for line, _ in rows]
+    numbers = np.empty((len(rows), len(columns)))
+    digits, problems = [], []
+    for i, column in enumerate(columns):
+        cells = [row[wanted[i]] for _, row in rows]
+        bad = next((k for k, cell in enumerate(cells) if not _NUMBER.fullmatch(cell) or math.isinf(float(cell))), None)
+        if bad is not None:
+            place = f"{file}, line {lines[bad]}, column {column.name!r}"
+            problems.append(Problem(where, column.key, f"{place}: {_number_expected(cells[bad])}", repr(cells[bad])))
+            continue
+        numbers[:, i] = list(map(float, cells))
+        digits.append(_digit(cells) * column.factor)
+    if problems:
+        raise InputError(*problems)
+    notes += [note for i, column in enumerate(columns) if (note := _unwrap(numbers[:, i], lines, file, column))]
+    with np.errstate(over="ignore"):  # told with the rates and accelerations that overflow
+        numbers *= [column.factor for column in columns]
+    return Samples(lines, numbers, digits, notes)
+
+
+def _rows(
+    data: bytes, file: str, columns: Sequence[Column], where: str, key: str
+) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The header, and every row that says anything with its line."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        remedy = f"iconv -f UTF-16 -t UTF-8 {shlex.quote(file)} > {shlex.quote(_beside(file, 'utf8'))}"
+        raise InputError(Problem(where, key, f"{file} is text in UTF-16: expected UTF-8 ({remedy} writes it so)"))
+    try:
+        text = data.decode("utf-8-sig")
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(Problem(where, key, f"{file} is no CSV file in UTF-8 ({error})")) from error
+    if not rows:
+        raise InputError(Problem(where, key, f"{file} is empty: expected a header that names its columns"))
+    line, header = rows[0][0], list(map(str.strip, rows[0][1]))
+    names = [column.name for column in columns]
+    problems = []
+    if not set(names) <= set(header):
+        layout = _layout(text, line, rows, names, file)
+        if layout:
+            raise InputError(Problem(where, key, layout))
+    for column in columns:
+        if column.name not in header:
+            problems.append(unknown(where, column.key, f"column of {file}", column.name, header))
+        elif header.count(column.name) > 1:
+            problems.append(Problem(where, column.key, f"{file} has more than one column {column.name!r}"))
+    ragged = next(((line, row) for line, row in rows[1:] if len(row) != len(header)), None)
+    if ragged:
+        line, row = ragged
+        expected = f"{file}, line {line}: expected {len(header)} cells{_ragged_hint(row, len(header))}"
+        problems.append(Problem(where, key, expected, str(len(row))))
+    if problems:
+        raise InputError(*problems)
+    return header, rows[1:]
+
+
+def _layout(text: str, line: int, rows: list[tuple[int, list[str]]], names: list[str], file: str) -> str:
+    """What makes the file another than one with commas and a header on top, with the remedy; "" if nothing does."""
+    header, lines = rows[0][1], text.splitlines()
+    first, below = lines[line - 1], lines[line : line + _DEEPEST_HEADER]
+    source = shlex.quote(file)
+    for kind, mark in _SEPARATORS.items():
+        cells = [cell.strip().strip('"') for cell in first.split(mark)]
+        if len(cells) > 1 and (len(header) == 1 or set(names) <= set(cells)):
+            commas = any(_DECIMAL_COMMA.fullmatch(cell.strip('"')) for row in below for cell in row.split(mark))
+            shown = "\\t" if mark == "\t" else mark
+            table = f"tr ',{shown}' '.,'" if commas else f"tr '{shown}' ,"
+            found = f"{kind} between its cells" + " and decimal commas" * commas
+            return (
+                f"{file} has {found}: expected commas between cells and decimal points "
+                f"({table} < {source} > {shlex.quote(_beside(file, 'commas'))} writes it so)"
+            )
+    if len(header) == 1 and len(first.split()) > 1 and set(names) <= set(first.split()):
+        remedy = f"sed 's/^  *//; s/  */,/g' {source} > {shlex.quote(_beside(file, 'commas'))}"
+        return f"{file} has blanks between its cells: expected commas ({remedy} writes it so)"
+    for later, row in rows[1:_DEEPEST_HEADER]:
+        if set(names) <= {cell.strip() for cell in row}:
+            remedy = f"tail -n +{later} {source} > {shlex.quote(_beside(file, 'header'))}"
+            return f"{file} has its header in line {later}: expected it in the first line ({remedy} writes it so)"
+    return ""
+
+
+def _beside(file: str, what: str) -> str:
+    """A name for the file that a remedy writes."""
+    return f"{file.removesuffix('.csv')}_{what}.csv"
+
+
+def _ragged_hint(row: list[str], expected: int) -> str:
+    """What a row of another length than the header's may come from."""
+    if row[0].lstrip().startswith("#"):
+        return " (CSV has no comments: take the line out)"
+    if len(row) > expected and all(map(_WHOLE.fullmatch, row)):
+        return (
+            " (if its numbers have decimal commas, they cannot be told from the commas between cells: write them with "
+            "points)"
+        )
+    kinds = [kind for kind, mark in _SEPARATORS.items() if any(mark in cell for cell in row)]
+    return f" with commas between them (this row has {kinds[0]})" if kinds else ""
+
+
+def _number_expected(cell: str) -> str:
+    if _DECIMAL_COMMA.fullmatch(cell):
+        return f"expected a decimal point, {cell.strip().replace(',', '.')}"
+    absent = not cell.strip() or not re.search("[0-9]", cell)
+    return "expected a finite number such as -1.5e-3" + (
+        " (a row without one may be left out: what max_gap allows is bridged)" if absent else ""
+    )
+
+
+def _names_units(row: list[str]) -> bool:
+    """Whether the row after the header holds units: no cell is a number, nor anything like one (nan, 1_000, "1,5")."""
+
+    def like_a_number(cell: str) -> bool:
+        try:
+            float(cell)
+        except ValueError:
+            return bool(re.match(r"\s*[+-]?[.,]?[0-9]+([:.,_-]|\s*$)", cell))
+        return True
+
+    return not any(map(like_a_number, row))
+
+
+def _unit_notes(cells: list[str], file: str, columns: Sequence[Column], where: str) -> list[str]:
+    """Notes on units that are not known. Raises InputError for those that the scenario does not read the column in."""
+    notes, problems = [], []
+    for cell, column in zip(cells, columns, strict=True):
+        told = cell.strip(" \t#[]()")
+        unit = _SPELLED.get(told.lower(), told)
+        if not column.unit or unit in ("", "-", column.unit):
+            continue
+        text = f"the units row of {file} has {told!r} for column {column.name!r}, and the scenario reads {column.unit}"
+        key = column.key.replace(".columns.", ".units.")
+        base = re.split(r"/|\^|\s|·", unit)[0]
+        if unit in _KNOWN:
+            alike = next((units for units in UNITS.values() if column.unit in units), {})
+            remedy = f'say "{unit}" here if it is right' if unit in alike else "name a column of the right kind"
+            problems.append(Problem(where, key, f"{text}: {remedy}, or put the units row right"))
+        elif _SPELLED.get(base.lower(), base) in _KNOWN:
+            problems.append(Problem(where, key, f"{text}: expected a column of positions or angles, not of rates"))
+        else:
+            notes.append(f"{key}: {text}: the scenario's unit counts")
+    if problems:
+        raise InputError(*problems)
+    return notes
+
+
+def _digit(numbers: Sequence[str]) -> float:
+    """What the last digit of numbers is worth, at most 1."""
+    text = " ".join(numbers)  # of which there may be millions: a search in one text is soon done
+    least = -float(max(map(len, re.findall(r"\.([0-9]*)(?:\s|\Z)", text)), default=0))
+    for places, exponent in re.findall(r"(?:\.([0-9]*))?[eE]([+-]?[0-9]+)", text):
+        least = min(least, float(exponent) - len(places))
+    return float(10.0**least)
+
+
+def _unwrap(samples: Floats, lines: list[int], file: str, column: Column) -> str:
+    """Takes whole turns out of the steps of an angle that pass half a turn, in place; a note on it, or ""."""
+    if math.isinf(column.half_turn):
+        return ""
+    with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are refused later
+        turns = np.round(np.diff(samples) / (2 * column.half_turn))
+        wraps = np.flatnonzero(turns)
+        if not wraps.size:
+            return ""
+        samples[1:] -= np.cumsum(turns) * (2 * column.half_turn)
+    named = ", ".join(str(lines[k + 1]) for k in wraps[:_MOST_LINES])
+    at = f"line {named}" if wraps.size == 1 else f"lines {named}"
+    more = f" and {wraps.size - _MOST_LINES} more" if wraps.size > _MOST_LINES else ""
+    return (
+        f"{column.key}: column {column.name!r} of {file} steps by more than half a turn at {at}{more}: read as an "
+        "angle that wraps, and unwrapped (one that does turn that fast needs more samples)"
+    )
