@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from springline.model.base import BaseMotion
+from springline.model.base import BaseState
 from springline.model.declared import column
 from springline.model.mechanisms import Mechanism
 from springline.model.parameters import Values
@@ -39,7 +39,7 @@ class EquationsOfMotion:
     bias: ca.SX
 
 
-def equations_of_motion(mechanism: Mechanism, q: ca.SX, dq: ca.SX, base: BaseMotion, p: Values) -> EquationsOfMotion:
+def equations_of_motion(mechanism: Mechanism, q: ca.SX, dq: ca.SX, base: BaseState, p: Values) -> EquationsOfMotion:
     """Derive (1) from the mechanism's energies; q, dq, and the entries of `base` and `p` are symbols.
 
     Raises ValueError for an energy that is no scalar of what it was given, or no quadratic form in the rates.
@@ -61,12 +61,12 @@ def equations_of_motion(mechanism: Mechanism, q: ca.SX, dq: ca.SX, base: BaseMot
         - ca.gradient(kinetic, q)
         + ca.gradient(potential, q)
     )
-    at_rest = [ca.SX.zeros(3), ca.SX.zeros(3), ca.vertcat(0, p.g, 0)]
+    at_rest = [ca.SX.zeros(3), ca.SX.zeros(3), base.rest_force(p.g)]
     rest = ca.substitute(moving, ca.vertcat(omega, alpha, gravity), ca.vertcat(*at_rest))
     weight = ca.substitute(ca.gradient(potential, q), gravity, at_rest[2])
 
     state, imu = ca.vertcat(q, dq), ca.vertcat(omega, alpha, gravity)
-    symbols = ca.vertcat(state, imu, *p.values())
+    symbols = ca.vertcat(state, imu, *p.values(), base.constants)
 
     def normal(expression: ca.SX) -> ca.SX:
         return collect(expression, symbols, [state, imu])

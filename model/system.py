@@ -9,13 +9,14 @@ the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db,
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
 
 import casadi as ca
 
 from springline.model import perturbation, signals
-from springline.model.base import COORDINATES, BaseMotion
+from springline.model.base import MOUNT, MOUNT_RPY, BaseState
 from springline.model.control import (
     A_MAX,
     CONTROLLERS,
@@ -50,7 +51,6 @@ from springline.model.quantities import (
     SIGMA,
     U_S,
     U_WISHED,
-    B,
     E,
     Entry,
     Quantity,
@@ -88,12 +88,30 @@ def own_control_tables(structure: Structure) -> dict[str, tuple[Parameter, ...]]
     }
 
 
+def _mount_symbols(vector: ParameterVector, structure: Structure) -> tuple[ca.SX | None, ca.SX | None]:
+    """Symbols of the mount's place and orientation, 3 x 1 each; None for one that is zero."""
+
+    def symbols(key: str, entries: Iterable[tuple[str, str, str]], meaning: str) -> ca.SX:
+        return ca.vertcat(
+            *(
+                vector.scalar(f"base_motion.{key}.{i}", f"{key}_{name}", unit, 0.0, f"{meaning}: {name}, {where}", REAL)
+                for i, (name, unit, where) in enumerate(entries)
+            )
+        )
+
+    return (
+        symbols("mount", MOUNT, "where the arm stands on the base") if structure.mount else None,
+        symbols("mount_rpy", MOUNT_RPY, "how the arm's axes are turned on the base") if structure.mount_rpy else None,
+    )
+
+
 class System:
     """Symbols, parameter slots and Functions of one structure.
 
     n       number of joints
     slots   meaning of each entry of p
     tables  layout of d
+    base_motion  motion, rate and acceleration of the base, in the coordinates that are there
     """
 
     def __init__(self, structure: Structure | None = None) -> None:
@@ -120,15 +138,18 @@ class System:
         self.t = ca.SX.sym("t")
         symbols = SignalSymbols(self.t, vector)
         reference = symbols.signal("reference", self.structure.reference, [(j.name, j.unit) for j in self.joints])
-        base = symbols.signal("base_motion", self.structure.base_motion, [(c.key, c.unit) for c in COORDINATES])
+        base = symbols.base_motion(self.structure.base_motion)
         self.tables, self.d = symbols.tables, symbols.d
         self._signal_expressions = ca.vertcat(*signals.stack(reference), *signals.stack(base))
+        mount = _mount_symbols(vector, self.structure)
         self._initial = self._initial_values(vector)
         self.p = vector.sx
         self.slots: tuple[Slot, ...] = tuple(vector.slots)
 
         self.q1d, self.dq1d, self.ddq1d = (ca.SX.sym(item.name, n) for item in REFERENCE)
-        self.base = BaseMotion(*(ca.SX.sym(f"{item.name}b", len(COORDINATES)) for item in BASE))
+        moving = self.structure.base_coordinates
+        self.base_motion = tuple(replace(item, coordinates=moving) for item in BASE)
+        self.base = BaseState(*(ca.SX.sym(f"{item.name}b", len(moving)) for item in BASE), moving, *mount)
         self.w = ca.vertcat(self.q1d, self.dq1d, self.ddq1d, self.base.b, self.base.db, self.base.ddb)
         self._state: dict[Quantity, ca.SX] = {item: ca.SX.sym(item.name, n) for item in self.drive.state}
         self.q1, self.dq1 = self._state[Q1], self._state[DQ1]
@@ -227,7 +248,7 @@ class System:
     @property
     def columns(self) -> tuple[Quantity, ...]:
         """What a trajectory shows, in the order of the loop's rows."""
-        return (T, *self.drive.state, Q1D, E, *self.sliding, U, *self.controller_states, B)
+        return (T, *self.drive.state, Q1D, E, *self.sliding, U, *self.controller_states, self.base_motion[0])
 
     @property
     def trajectory(self) -> tuple[Entry, ...]:
@@ -386,7 +407,7 @@ class System:
 
     def _arm_energy(self) -> ca.SX:
         """Kinetic and potential energy of the arm with the base at rest, J."""
-        rest, up = ca.SX.zeros(3), ca.vertcat(0, self._plant.g, 0)
+        rest, up = ca.SX.zeros(3), self.base.rest_force(self._plant.g)
         moving = self.mechanism.kinetic_energy(self.q1, self.dq1, rest, self._plant)
         return moving + self.mechanism.potential_energy(self.q1, up, self._plant)
 

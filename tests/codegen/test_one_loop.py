@@ -87,7 +87,7 @@ def structure_of(mechanism: str, **changes: Any) -> Structure:
 def values_of(structure: Structure) -> np.ndarray:
     """The mechanism's own reference and start, under a base that moves; U_max low enough to limit now and then."""
     arm = MECHANISMS[structure.mechanism]
-    given = {"base_motion.shake.0.amplitude": 0.1, "base_motion.shake.0.omega": 9.0,
+    given = {"base_motion.heave.0.amplitude": 0.1, "base_motion.heave.0.omega": 9.0,
              "base_motion.pitch.0.amplitude": 0.05, "base_motion.pitch.0.omega": 3.0}  # fmt: skip
     for i, joint in enumerate(arm.joints):
         given |= {f"initial.q.{i}": arm.start_position[i], f"reference.{joint.name}.offset": arm.reference_offset[i]}

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from springline.codegen.export import Body, Export, ScalarPrinter, port_entries
 from springline.codegen.program import Real, constant_expression, literal, scalar_slopes, scalar_stages
 from springline.model.parameters import Bounds
-from springline.model.quantities import A_LIMITED, BASE, REFERENCE, SATURATED, E, Quantity, U, entries
+from springline.model.quantities import A_LIMITED, REFERENCE, SATURATED, E, Quantity, U, entries
 
 STATUS = (
     ("OK", "done"),
@@ -84,7 +84,7 @@ class TypedInterface:
             "command": declared(U),
             "diagnostics": (*numbers, *declared(*limits, integer=True)),
             "state": declared(*system.drive.state),
-            "base": declared(*BASE),
+            "base": declared(*system.base_motion),
         }
         if remembers:
             self.structures["memory"] = declared(*system.controller_states)
