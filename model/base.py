@@ -47,6 +47,9 @@ COORDINATES = (
 PAPER_COORDINATES = COORDINATES[:3]
 """Those of the paper, which are always there; the others are where they move."""
 
+ALIASES = {c.alias: c.key for c in COORDINATES if c.alias}
+"""Another name of a coordinate in scenario files -> its key."""
+
 MOTION_ORDER = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """The order in which people name them."""
 
@@ -62,6 +65,14 @@ def moving(terms: Sequence[int]) -> tuple[BaseCoordinate, ...]:
     """
     others = zip(COORDINATES[len(PAPER_COORDINATES) :], terms[len(PAPER_COORDINATES) :], strict=False)
     return PAPER_COORDINATES + tuple(coordinate for coordinate, count in others if count)
+
+
+def shortest(terms: Sequence[int]) -> tuple[int, ...]:
+    """Terms for each of COORDINATES without zeros at the end that may be left out, so that equal motions are equal."""
+    count = len(terms)
+    while count > len(PAPER_COORDINATES) and not terms[count - 1]:
+        count -= 1
+    return tuple(terms[:count])
 
 
 def turned(roll: ca.SX, pitch: ca.SX, yaw: ca.SX | None = None) -> ca.SX:
@@ -148,7 +159,7 @@ class BaseState:
     @property
     def _omega(self) -> ca.SX:
         """Roll rate along x, pitch rate along z before the roll, yaw rate along the inertial Y."""
-        pitch, roll = self._of(self.b, "pitch"), self._of(self.b, "roll")
+        roll = self._of(self.b, "roll")
         pitching, rolling = self._of(self.db, "pitch"), self._of(self.db, "roll")
         omega = ca.vertcat(rolling, pitching * ca.sin(roll), pitching * ca.cos(roll))
         yawing = self._find(self.db, "yaw")
@@ -161,7 +172,10 @@ class BaseState:
     def _with_drift(self, force: ca.SX) -> ca.SX:
         """A specific force of the base's heave and tilt, plus what surge, sway and the foot's distance add."""
         if {"surge", "sway"} & {item.key for item in self.coordinates}:
-            yaw, drift = self._find(self.b, "yaw"), ca.vertcat(self._of(self.ddb, "surge"), 0, self._of(self.ddb, "sway"))
+            yaw, drift = (
+                self._find(self.b, "yaw"),
+                ca.vertcat(self._of(self.ddb, "surge"), 0, self._of(self.ddb, "sway")),
+            )
             force = force + self._tilt.T @ (drift if yaw is None else _about_y(yaw).T @ drift)
         if self.mount is not None:
             omega = self._omega

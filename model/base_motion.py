@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import cache
 from typing import ClassVar
 
 import casadi as ca
 
-from springline.model.base import COORDINATES, MOTION_ORDER
+from springline.model.base import ALIASES, COORDINATES, MOTION_ORDER
 from springline.model.declared import column, expect_names, expect_parameters, expect_text, snake_case
 from springline.model.parameters import Parameter, ParameterVector, Values
 from springline.model.registry import Registry
 from springline.model.signals import CONSTANT_ZERO, Signal
 
-RESERVED = ("kind", "mount", "mount_rpy", *(name for c in COORDINATES for name in (c.key, c.alias) if name))
+RESERVED = ("kind", "mount", "mount_rpy", *(c.key for c in COORDINATES), *ALIASES)
 """Keys of [base_motion] that no parameter of such a class may be called."""
 
 
@@ -65,6 +66,7 @@ def signals_of(motion: BaseMotion, t: ca.SX, p: Values) -> dict[str, Signal]:
     return result
 
 
+@cache
 def moving_terms(motion: BaseMotion) -> tuple[int, ...]:
     """1 for each of COORDINATES that moves, else 0. Raises ValueError as `signals_of` does."""
     p = ParameterVector().table("base_motion", motion.parameters, ())
@@ -83,6 +85,7 @@ def check_motion(motion: BaseMotion) -> None:
             raise ValueError(f"{owner}: parameters, {item.name}: expected one number, not one per joint")
         if item.name in RESERVED:
             raise ValueError(f"{owner}: parameters: {item.name!r} is a key of [base_motion] already")
+    moving_terms(motion)
 
 
 MOTIONS: Registry[BaseMotion] = Registry(BaseMotion, {}, check_motion)

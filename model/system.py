@@ -149,7 +149,8 @@ class System:
         self.q1d, self.dq1d, self.ddq1d = (ca.SX.sym(item.name, n) for item in REFERENCE)
         moving = self.structure.base_coordinates
         self.base_motion = tuple(replace(item, coordinates=moving) for item in BASE)
-        self.base = BaseState(*(ca.SX.sym(f"{item.name}b", len(moving)) for item in BASE), moving, *mount)
+        b, db, ddb = (ca.SX.sym(f"{item.name}b", len(moving)) for item in BASE)
+        self.base = BaseState(b, db, ddb, moving, *mount)
         self.w = ca.vertcat(self.q1d, self.dq1d, self.ddq1d, self.base.b, self.base.db, self.base.ddb)
         self._state: dict[Quantity, ca.SX] = {item: ca.SX.sym(item.name, n) for item in self.drive.state}
         self.q1, self.dq1 = self._state[Q1], self._state[DQ1]

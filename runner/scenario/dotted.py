@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from springline.codegen.numbers import doubles
+from springline.model.base import ALIASES
 from springline.runner.files import shortened
 
 _LONGEST_PATH = 16  # no document has keys of ten parts, and each part is a call
@@ -18,6 +19,28 @@ def expect_keys(given: object, example: str) -> None:
     """Raise TypeError for what is no mapping of dotted keys to something, as `example` is one."""
     if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
         raise TypeError(f"expected {example}, got {shortened(repr(given))}")
+
+
+BY_COORDINATE = ("columns", "units", "scale")
+"""Tables in [base_motion] whose keys are its coordinates."""
+
+
+def canonical_key(key: str) -> str:
+    """A key by the names that things have in a resolved scenario: "base_motion.shake" -> "base_motion.heave"."""
+    parts = key.split(".")
+    at = 2 if parts[1:2] and parts[1] in BY_COORDINATE else 1
+    if parts[0] == "base_motion" and at < len(parts):
+        parts[at] = ALIASES.get(parts[at], parts[at])
+    return ".".join(parts)
+
+
+def other_spellings(key: str) -> list[str]:
+    """What else a canonical key may be called."""
+    found = []
+    for alias, name in ALIASES.items():
+        spelled = ".".join(alias if part == name else part for part in key.split("."))
+        found += [spelled] if spelled != key and canonical_key(spelled) == key else []
+    return found
 
 
 def scale_key(key: str) -> str:

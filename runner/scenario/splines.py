@@ -78,7 +78,7 @@ class Column:
     """A column of a CSV file.
 
     name, key  its name there, and the scenario key that asks for it
-    factor     its unit in SI units
+    factor     what its numbers are multiplied with to be in SI units, negative where they have the other sign
     half_turn  half a turn in its unit if it is an angle, else inf
     """
 
@@ -311,7 +311,7 @@ def read_table(
     _expect_moderate(values, file, channels, where)
     if ends == "periodic":
         values = _closed(values, file, channels, where)
-    digit = [_digit(row[i] for row in cells) * column.factor for i, column in enumerate(columns)]
+    digit = [_digit(row[i] for row in cells) * abs(column.factor) for i, column in enumerate(columns)]
     table = spline(float(t[0]) - t0, dt, values, ends, np.array(digit[1:]))
     _expect_moderate(np.abs(table.coefficients).max(axis=2), file, channels, where)
     return table, notes
