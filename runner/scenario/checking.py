@@ -16,7 +16,7 @@ from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE
 from springline.runner.files import InputError, Problem, unknown
 from springline.runner.scenario import schema
-from springline.runner.scenario.dotted import BY_COORDINATE
+from springline.runner.scenario.dotted import BY_COORDINATE, respelled, respellings
 from springline.runner.scenario.locate import canonical_path, read_signal_file
 from springline.runner.scenario.splines import HALF_TURN, UNITS, Column, Ends, Spline, read_table
 from springline.runner.scenario.user_code import UserClass, canonical_reference, load_class, read_class
@@ -46,7 +46,7 @@ def resolve(
         else:
             problems.append(Problem(where, name, "expected a table", schema.given_text(table)))
             given[name] = {}
-    given["base_motion"], respelled = _by_its_names(given["base_motion"], where, problems)
+    given["base_motion"], given_names = _by_its_names(given["base_motion"], where, problems)
     code, names = _opened_doors(given, folder, where, problems)
     mechanism = names["mechanism.name"]
     # Which keys are valid depends on all that was chosen, and on the drive, whose kind decides what it can be told.
@@ -103,36 +103,27 @@ def resolve(
         except InputError as error:
             problems += error.problems
     if problems:
-        raise InputError(*(replace(problem, key=_respelled(problem.key, respelled)) for problem in problems))
+        raise InputError(*(replace(problem, key=respelled(problem.key, given_names)) for problem in problems))
     return document, tuple(tables), tuple(notes), code
 
 
 def _by_its_names(table: dict[str, Any], where: str, problems: list[Problem]) -> tuple[dict[str, Any], dict[str, str]]:
-    """[base_motion] with each coordinate by its own name, and the dotted keys that were given by another."""
-    respelled: dict[str, str] = {}
+    """[base_motion] with each coordinate by its own name, and which keys were given by another (`respellings`)."""
+    keys: list[str] = []
 
     def renamed(given: dict[str, Any], key: str) -> dict[str, Any]:
+        keys.extend(f"{key}.{item}" for item in given)
         for alias, name in ALIASES.items():
             if alias in given and name in given:
                 text = f"is another name of {key}.{name}: give one of them"
                 problems.append(Problem(where, f"{key}.{alias}", text))
-            elif alias in given:
-                respelled[f"{key}.{name}"] = f"{key}.{alias}"
         return {ALIASES.get(item, item): value for item, value in given.items()}
 
     table = renamed(table, "base_motion")
     for inner in BY_COORDINATE:
         if isinstance(table.get(inner), dict):
             table[inner] = renamed(table[inner], f"base_motion.{inner}")
-    return table, respelled
-
-
-def _respelled(key: str, respelled: Mapping[str, str]) -> str:
-    """A key as it was given."""
-    for name, given in respelled.items():
-        if key == name or key.startswith(f"{name}."):
-            return given + key[len(name) :]
-    return key
+    return table, respellings(keys)
 
 
 def _opened_doors(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,20 +27,35 @@ BY_COORDINATE = ("columns", "units", "scale")
 
 def canonical_key(key: str) -> str:
     """A key by the names that things have in a resolved scenario: "base_motion.shake" -> "base_motion.heave"."""
-    parts = key.split(".")
-    at = 2 if parts[1:2] and parts[1] in BY_COORDINATE else 1
-    if parts[0] == "base_motion" and at < len(parts):
-        parts[at] = ALIASES.get(parts[at], parts[at])
-    return ".".join(parts)
+    for name, other in respellings([key]).items():
+        return name + key[len(other) :]
+    return key
+
+
+def respellings(keys: Iterable[str]) -> dict[str, str]:
+    """Which keys, or beginnings of keys, are given by another name: "base_motion.heave" -> "base_motion.shake"."""
+    found = {}
+    for key in keys:
+        table, *parts = key.split(".")
+        head = [table, *parts[:1]] if parts[:1] and parts[0] in BY_COORDINATE else [table]
+        rest = key.split(".")[len(head) :]
+        if table == "base_motion" and rest and rest[0] in ALIASES:
+            found[".".join([*head, ALIASES[rest[0]]])] = ".".join([*head, rest[0]])
+    return found
+
+
+def respelled(key: str, given: Mapping[str, str]) -> str:
+    """A canonical key as it was given, by what `respellings` found."""
+    for name, other in given.items():
+        if key == name or key.startswith(f"{name}."):
+            return other + key[len(name) :]
+    return key
 
 
 def other_spellings(key: str) -> list[str]:
     """What else a canonical key may be called."""
-    found = []
-    for alias, name in ALIASES.items():
-        spelled = ".".join(alias if part == name else part for part in key.split("."))
-        found += [spelled] if spelled != key and canonical_key(spelled) == key else []
-    return found
+    aliases = {f"base_motion.{name}": f"base_motion.{alias}" for alias, name in ALIASES.items()}
+    return [spelled for spelled in [respelled(key, aliases)] if spelled != key]
 
 
 def scale_key(key: str) -> str:

@@ -36,6 +36,8 @@ from springline.runner.scenario.dotted import (
     other_spellings,
     plain,
     replaced,
+    respelled,
+    respellings,
     scale_key,
 )
 from springline.runner.scenario.locate import expect_kind, read_scenario, relative_path
@@ -307,6 +309,7 @@ class Scenario:
         if not overrides:
             return self
         where = _overridden(self.source)
+        given = respellings(overrides)
         overrides = self._canonical(overrides, where)
         document = self._without_excluded(overrides)
         problems = []
@@ -320,7 +323,12 @@ class Scenario:
                 problems.append(Problem(where, key, f"expected a value that TOML can hold: {error}"))
         if problems:
             raise InputError(*problems)
-        changed = Scenario(self.source, self.folder, *resolve(document, where, self.folder, read=read))
+        try:
+            resolved = resolve(document, where, self.folder, read=read)
+        except InputError as error:
+            renamed = (replace(problem, key=respelled(problem.key, given)) for problem in error.problems)
+            raise InputError(*renamed) from error
+        changed = Scenario(self.source, self.folder, *resolved)
         if read:
             changed.expect_computable(where)
         return changed
