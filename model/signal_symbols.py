@@ -9,7 +9,7 @@ import casadi as ca
 from springline.model import signals as formulas
 from springline.model.base import COORDINATES, moving
 from springline.model.base_motion import MOTIONS, signals_of
-from springline.model.parameters import ParameterVector
+from springline.model.parameters import Joint, ParameterVector
 from springline.model.signals import CONSTANT_ZERO, Signal
 from springline.model.structure import SignalShape, TableLayout
 
@@ -52,12 +52,12 @@ class SignalSymbols:
         one = self._via_points if shape.kind == "polynomial" else self._sines
         return [one(table, key, unit, count) for (key, unit), count in zip(coordinates, shape.terms, strict=True)]
 
-    def base_motion(self, shape: SignalShape) -> list[Signal]:
+    def base_motion(self, shape: SignalShape, joints: tuple[Joint, ...]) -> list[Signal]:
         """Expressions of the base's coordinates that are there (`moving`), likewise."""
         coordinates = moving(shape.terms)
         if shape.kind == "own":
             motion = MOTIONS[shape.own]
-            found = signals_of(motion, self.t, self._vector.table("base_motion", motion.parameters, ()))
+            found = signals_of(motion, self.t, self._vector.table("base_motion", motion.parameters, joints))
             return [found[c.key] for c in coordinates]
         counts = dict(zip((c.key for c in COORDINATES), shape.terms, strict=False))
         there = SignalShape(shape.kind, tuple(counts.get(c.key, 0) for c in coordinates))

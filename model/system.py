@@ -138,7 +138,7 @@ class System:
         self.t = ca.SX.sym("t")
         symbols = SignalSymbols(self.t, vector)
         reference = symbols.signal("reference", self.structure.reference, [(j.name, j.unit) for j in self.joints])
-        base = symbols.base_motion(self.structure.base_motion)
+        base = symbols.base_motion(self.structure.base_motion, self.joints)
         self.tables, self.d = symbols.tables, symbols.d
         self._signal_expressions = ca.vertcat(*signals.stack(reference), *signals.stack(base))
         mount = _mount_symbols(vector, self.structure)

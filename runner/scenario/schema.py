@@ -354,12 +354,12 @@ def schema(
                 "polynomial": _reference_polynomials(mechanism),
                 "table": _table_section({joint.name: joint.unit for joint in joints}),
             },
-            "base_motion": _base_motion_sections(motion),
+            "base_motion": _base_motion_sections(motion, joints),
         },
     )
 
 
-def _base_motion_sections(motion: str) -> dict[str, type[Section]]:
+def _base_motion_sections(motion: str, joints: Sequence[Joint]) -> dict[str, type[Section]]:
     """[base_motion] by kind; an arm stands somewhere on a base that is at rest, too."""
     mount: dict[str, Any] = {
         "mount": (Annotated[Any, triple(MOUNT)], [0.0, 0.0, 0.0]),
@@ -373,7 +373,7 @@ def _base_motion_sections(motion: str) -> dict[str, type[Section]]:
     }
     if motion:
         kind = {"kind": (Annotated[str, text()], ...)}
-        sections[motion] = _section("own", {**kind, **_numbers(MOTIONS[motion].parameters, ()), **mount})
+        sections[motion] = _section("own", {**kind, **_numbers(MOTIONS[motion].parameters, joints), **mount})
     return sections
 
 

@@ -145,7 +145,6 @@ class Inertial:
         self.power = compiled(ddt(kinetic + potential))
         self.base_power = compiled(carried)
 
-
     def frame(self, b: Sequence[sp.Symbol]) -> tuple[sp.Matrix, sp.Matrix]:
         """The base's origin, and the rotation of its axes: shake along Y; pitch, then roll."""
         shake, pitch, roll = b

@@ -122,7 +122,7 @@ def test_signs():
 
 
 def test_a_mirrored_motion_is_felt_mirrored(rng):
-    """Port and starboard are alike: z changes its sign, and so do sway, the rotations about x and y, and z of the foot."""
+    """Port and starboard are alike: z changes its sign, and so do sway, rotations about x and y, and z of the foot."""
     flipped = np.array([1, 1, -1, 1, -1, -1])
     motion, mount, rpy = random_motion(rng), rng.uniform(-5, 5, 3), rng.uniform(-1, 1, 3)
     vector, turn = np.array([1, 1, -1]), np.array([-1, -1, 1])
@@ -164,7 +164,9 @@ def case(mounted, rng):
 def scale_of(q, values, base):
     """Mass times the largest accelerations around, per joint: what rounding is measured against."""
     mass, reach = values[0] + values[1], 12 + np.abs(q[0])
-    turn = sum(np.abs(base[2][k]) for k in (PITCH, ROLL, YAW)) + sum(np.abs(base[1][k]) for k in (PITCH, ROLL, YAW)) ** 2
+    turn = (
+        sum(np.abs(base[2][k]) for k in (PITCH, ROLL, YAW)) + sum(np.abs(base[1][k]) for k in (PITCH, ROLL, YAW)) ** 2
+    )
     force = mass * (40 + values[5] + (turn + 30) * reach)
     return np.stack([force, force * 2 + values[2] * (turn + 50)])
 
@@ -218,7 +220,7 @@ def test_power_balance(mounted, inertial_of_six, case, rng):
 
 
 def test_energy_counts_height_from_the_foot_along_the_real_vertical(mounted, inertial_of_six, case):
-    q, dq, base, values, p = case
+    q, dq, _, values, p = case
     x, zero = np.concatenate([q, dq, q, 0 * q]), np.zeros((6, SAMPLES))
     foot = (values[0] + values[1]) * values[5] * values[7]
     expected = inertial_of_six.energy(q, dq, 0 * q, zero, zero, zero, values) - foot
