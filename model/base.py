@@ -23,24 +23,26 @@ import casadi as ca
 class BaseCoordinate:
     """One coordinate of the base's motion.
 
-    key     in scenario files;  alias: another name for it there, and its name in C
-    symbol  of its column in a trajectory and of its member in C
-    unit    SI
+    key       in scenario files;  alias: another name for it there, and its name in C
+    symbol    of its column in a trajectory and of its member in C
+    unit      SI
+    positive  which way it goes as it grows
     """
 
     key: str
     symbol: str
     unit: str
+    positive: str
     alias: str = ""
 
 
 COORDINATES = (
-    BaseCoordinate("heave", "y_r1", "m", "shake"),
-    BaseCoordinate("pitch", "theta_1z", "rad"),
-    BaseCoordinate("roll", "theta_1x", "rad"),
-    BaseCoordinate("surge", "surge", "m"),
-    BaseCoordinate("sway", "sway", "m"),
-    BaseCoordinate("yaw", "yaw", "rad"),
+    BaseCoordinate("heave", "y_r1", "m", "up", "shake"),
+    BaseCoordinate("pitch", "theta_1z", "rad", "bow up"),
+    BaseCoordinate("roll", "theta_1x", "rad", "starboard down"),
+    BaseCoordinate("surge", "surge", "m", "forward"),
+    BaseCoordinate("sway", "sway", "m", "to starboard"),
+    BaseCoordinate("yaw", "yaw", "rad", "bow to port"),
 )
 """All of them, in the order of b."""
 

@@ -66,7 +66,7 @@ class Quantity:
             )
         if self.per == "base":
             return tuple(
-                Entry(f"{self.name}{c.symbol}", self.unit.format(q=c.unit), f"{self.meaning}: {c.key}")
+                Entry(f"{self.name}{c.symbol}", self.unit.format(q=c.unit), f"{self.meaning}: {c.key}, {c.positive}")
                 for c in self.coordinates
             )
         return (Entry(self.name, self.unit, self.meaning),)

@@ -2,7 +2,7 @@
 
     python -m runner.report.docs_tables [--write]
 
-Prints the columns of a trajectory and the metrics of a run of the packaged arm; --write (`make docs-tables`) puts them
+Prints the columns of a trajectory and the metrics of a run of the packaged arm on a base that moves in every way; --write (`make docs-tables`) puts them
 into docs/scenarios.md, between the comments that name them. The text around them is written by hand.
 """
 
@@ -13,8 +13,10 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from springline.model.base import COORDINATES
 from springline.model.parameters import Joint
 from springline.model.quantities import METRICS, Quantity
+from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 
 SCENARIOS_PAGE = Path(__file__).parents[2] / "docs" / "scenarios.md"
@@ -54,7 +56,7 @@ def cell(text: str) -> str:
 
 def tables() -> dict[str, str]:
     """The tables by name."""
-    system = System()
+    system = System(Structure(base_motion=SignalShape("sine", (1,) * len(COORDINATES))))
     return {"trajectory": table(system.columns, system.joints), "metrics": table(METRICS, system.joints)}
 
 

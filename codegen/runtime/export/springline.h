@@ -49,7 +49,7 @@ typedef struct springline_state {
 {{state_fields}}
 } springline_state;
 
-/* Motion of the base: shake y_r1, pitch theta_1z, roll theta_1x, their rates d_ and accelerations dd_. */
+/* Motion of the base along X forward, Y up and Z to starboard, its rates d_ and accelerations dd_. */
 typedef struct springline_base {
 {{base_fields}}
 } springline_base;
