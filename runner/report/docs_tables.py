@@ -2,8 +2,9 @@
 
     python -m runner.report.docs_tables [--write]
 
-Prints the columns of a trajectory and the metrics of a run of the packaged arm on a base that moves in every way; --write (`make docs-tables`) puts them
-into docs/scenarios.md, between the comments that name them. The text around them is written by hand.
+Prints the columns of a trajectory, on a base that moves in every way, and the metrics of a run of the packaged arm;
+--write (`make docs-tables`) puts them into docs/scenarios.md, between the comments that name them. The text around them
+is written by hand.
 """
 
 from __future__ import annotations

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
+import subprocess
+import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -19,6 +22,7 @@ from springline.model.structure import SignalShape
 from springline.runner import batch, load_scenario, simulate
 from springline.runner.cli import app
 from springline.runner.files.errors import InputError
+from springline.runner.report import conventions
 from springline.runner.scenario.scenario import Scenario
 
 DATA = resources.files("springline.runner") / "scenarios" / "data"
@@ -210,6 +214,36 @@ def test_a_scale_that_is_none_is_told(tmp_path: Path, scale: dict[str, object], 
     assert all(part in str(caught.value) for part in told), str(caught.value)
 
 
+DOCS = Path(__file__).parents[2] / "docs" / "conventions.md"
+NED = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # components along x, y to starboard, z down -> ours
+ENU = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])  # along x, y to port, z up -> ours
+
+
+@pytest.mark.parametrize(("page", "axes"), [("ned.csv", NED), ("enu.csv", ENU), ("orcaflex.csv", ENU)])
+def test_what_the_page_says_of_other_conventions(page: str, axes: np.ndarray) -> None:
+    """Position and attitude of a ship told in other axes, scaled as docs/conventions.md says, are ours."""
+    blocks = [tomllib.loads(text) for text in re.findall(r"```toml\n(.*?)```", DOCS.read_text("utf-8"), re.DOTALL)]
+    (table,) = (b["base_motion"] for b in blocks if b["base_motion"].get("path") == page)
+    units = table.get("units", {})
+    assert all(units.get(key, "rad") == ("rad" if page == "enu.csv" else "deg") for key in ("roll", "pitch", "yaw"))
+    told = dict(zip(ALL, (1.0, 2.0, 3.0, 0.3, -0.4, 1.1), strict=True))
+    ours = {key: value * table["scale"].get(key, 1.0) for key, value in told.items()}
+    place = axes @ [told["surge"], told["sway"], told["heave"]]
+    assert place.tolist() == [ours["surge"], ours["heave"], ours["sway"]]
+    theirs = Rotation.from_euler("ZYX", [told["yaw"], told["pitch"], told["roll"]]).as_matrix()
+    rotation = Rotation.from_euler("YZX", [ours["yaw"], ours["pitch"], ours["roll"]]).as_matrix()
+    np.testing.assert_allclose(rotation, axes @ theirs @ axes.T, atol=1e-15)
+
+
+def test_the_picture_says_what_the_model_does() -> None:
+    said = f"<!-- shown: {conventions.shown()} -->".encode()
+    picture = DOCS.parent / "images" / "conventions.svg"
+    assert said in picture.read_bytes(), "stale: run `make docs-pictures`"
+    assert said in conventions.drawn() and conventions.drawn() == conventions.drawn()
+    assert [conventions.sense(view) for view in conventions.VIEWS] == [1, -1, 1]
+    assert "](images/conventions.svg)" in DOCS.read_text("utf-8")
+
+
 # Mounts
 
 
@@ -320,6 +354,30 @@ def test_a_motion_of_a_users_own_moves_the_base(circle: Path) -> None:
     turn = 0.05 * 1.7
     np.testing.assert_allclose(db, [0, 0, 0, 7.5 * np.cos(turn), -7.5 * np.sin(turn), 0.05], atol=1e-13)
     np.testing.assert_allclose(ddb, [0, 0, 0, -0.375 * np.sin(turn), -0.375 * np.cos(turn), 0], atol=1e-13)
+
+
+def test_its_motion_is_in_the_exported_c(circle: Path, tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["export", "c", str(circle), "-o", str(tmp_path / "c")], prog_name="springline")
+    assert done.exit_code == 0, done.output
+    (tmp_path / "main.c").write_text("""
+        #include <stdio.h>
+        #include "springline.h"
+        static springline_controller controller;
+        int main(void) {
+          springline_reference reference;
+          springline_base base;
+          springline_init(&controller, &springline_default_config);
+          springline_signals(&controller, 1.7, &reference, &base);
+          printf("%.17g %.17g %.17g\\n", base.d_surge, base.theta_1x, base.dd_sway);
+          return 0;
+        }
+    """)
+    include = [f"-I{tmp_path}/c/include", f"-I{tmp_path}/c/src"]
+    sources = [tmp_path / "main.c", tmp_path / "c" / "src" / "springline.c"]
+    subprocess.run(["cc", "-std=c99", *include, *sources, "-o", tmp_path / "main"], check=True)
+    printed = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.split()
+    expected = [7.5 * math.cos(0.085), 0.03, -0.375 * math.cos(0.085)]
+    np.testing.assert_allclose([float(word) for word in printed], expected, rtol=1e-15)
 
 
 def test_its_parameters_vary_and_its_file_travels(circle: Path, tmp_path: Path) -> None:
