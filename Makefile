@@ -42,8 +42,9 @@ format: .venv/installed ## let ruff put the code in order
 docs-tables: .venv/installed ## print the tables of columns and metrics in docs/scenarios.md anew
 	$(BIN)/python -m runner.report.docs_tables --write
 
-docs-pictures: .venv/installed ## draw the picture of docs/architecture.md anew, from the imports
+docs-pictures: .venv/installed ## draw the pictures of docs/architecture.md and docs/conventions.md anew
 	$(BIN)/python -m runner.report.architecture
+	$(BIN)/python -m runner.report.conventions
 
 math-accuracy: .venv/installed ## measure the elementary functions against mpmath; writes the table in docs/math.md
 	$(BIN)/python -m benchmarks.math_accuracy --write

@@ -1,6 +1,6 @@
 from . import quantities as quantities
 from . import theory as theory
-from .base import BaseMotion as BaseMotion
+from .base_motion import BaseMotion as BaseMotion
 from .control import Control as Control
 from .control import Controller as Controller
 from .control import Law as Law

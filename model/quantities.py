@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from springline.model.base import COORDINATES
+from springline.model.base import PAPER_COORDINATES, BaseCoordinate
 from springline.model.parameters import Joint
 
 Scope = Literal["joint", "base", "scalar"]
@@ -40,7 +40,7 @@ class Quantity:
     symbol   for figures, in TeX's mathematics
     unit     SI; "{q}" and "{F}" stand for the coordinate's unit and its force's
     meaning  a phrase without a full stop
-    per      what it has one entry of
+    per      what it has one entry of;  coordinates: those of the base, where it is that
     initial  its value at the beginning, where it is a state of the controller
     """
 
@@ -50,6 +50,7 @@ class Quantity:
     meaning: str
     per: Scope = "joint"
     initial: float = 0.0
+    coordinates: tuple[BaseCoordinate, ...] = PAPER_COORDINATES
 
     def entries(self, joints: Sequence[Joint]) -> tuple[Entry, ...]:
         """Its entries for an arm with these joints, in the order of a column vector."""
@@ -65,8 +66,8 @@ class Quantity:
             )
         if self.per == "base":
             return tuple(
-                Entry(f"{self.name}{c.symbol}", self.unit.format(q=c.unit), f"{self.meaning}: {c.key}")
-                for c in COORDINATES
+                Entry(f"{self.name}{c.symbol}", self.unit.format(q=c.unit), f"{self.meaning}: {c.key}, {c.positive}")
+                for c in self.coordinates
             )
         return (Entry(self.name, self.unit, self.meaning),)
 

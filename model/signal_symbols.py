@@ -7,11 +7,16 @@ from typing import Literal
 import casadi as ca
 
 from springline.model import signals as formulas
-from springline.model.parameters import ParameterVector
+from springline.model.base import COORDINATES, moving
+from springline.model.base_motion import MOTIONS, signals_of
+from springline.model.parameters import Joint, ParameterVector
 from springline.model.signals import CONSTANT_ZERO, Signal
 from springline.model.structure import SignalShape, TableLayout
 
 SignalTableName = Literal["reference", "base_motion"]
+
+_C_NAMES = {c.key: c.alias for c in COORDINATES if c.alias}
+"""What C has called the terms of a coordinate before it had its name of today, and still does."""
 
 
 class SignalSymbols:
@@ -47,6 +52,17 @@ class SignalSymbols:
         one = self._via_points if shape.kind == "polynomial" else self._sines
         return [one(table, key, unit, count) for (key, unit), count in zip(coordinates, shape.terms, strict=True)]
 
+    def base_motion(self, shape: SignalShape, joints: tuple[Joint, ...]) -> list[Signal]:
+        """Expressions of the base's coordinates that are there (`moving`), likewise."""
+        coordinates = moving(shape.terms)
+        if shape.kind == "own":
+            motion = MOTIONS[shape.own]
+            found = signals_of(motion, self.t, self._vector.table("base_motion", motion.parameters, joints))
+            return [found[c.key] for c in coordinates]
+        counts = dict(zip((c.key for c in COORDINATES), shape.terms, strict=False))
+        there = SignalShape(shape.kind, tuple(counts.get(c.key, 0) for c in coordinates))
+        return self.signal("base_motion", there, [(c.key, c.unit) for c in coordinates])
+
     def _table(self, table: SignalTableName, shape: SignalShape, coordinates: list[str]) -> list[Signal]:
         tau = ca.SX.sym(f"{table}_tau")
         channels = tuple(i for i, count in enumerate(shape.terms) if count)
@@ -69,31 +85,31 @@ class SignalSymbols:
 
     def _sines(self, table: str, key: str, unit: str, count: int) -> Signal:
         offset = ca.SX(0)
-        dotted = f"{table}.{key}"
+        dotted, stem = f"{table}.{key}", f"{table}_{_C_NAMES.get(key, key)}"
         if table == "reference":
             offset = self._vector.scalar(
-                f"{dotted}.offset", f"{table}_{key}_offset", unit, 0.0, f"offset of the {key} reference"
+                f"{dotted}.offset", f"{stem}_offset", unit, 0.0, f"offset of the {key} reference"
             )
             dotted += ".terms"
         terms = [
             (
                 self._vector.scalar(
                     f"{dotted}.{k}.amplitude",
-                    f"{table}_{key}_{k}_amplitude",
+                    f"{stem}_{k}_amplitude",
                     unit,
                     0.0,
                     f"amplitude of {key} term {k}",
                 ),
                 self._vector.scalar(
                     f"{dotted}.{k}.omega",
-                    f"{table}_{key}_{k}_omega",
+                    f"{stem}_{k}_omega",
                     "rad/s",
                     0.0,
                     f"angular frequency of {key} term {k}",
                 ),
                 self._vector.scalar(
                     f"{dotted}.{k}.phase",
-                    f"{table}_{key}_{k}_phase",
+                    f"{stem}_{k}_phase",
                     "rad",
                     0.0,
                     f"phase of {key} term {k}",

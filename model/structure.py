@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from springline.model.base import BaseCoordinate, moving
 from springline.model.control import LogForm, SurfaceExponents
 from springline.model.drive import DriveKind
 
-SignalKind = Literal["none", "sine", "polynomial", "table"]
+SignalKind = Literal["none", "sine", "polynomial", "table", "own"]
 MotorStart = Literal["unloaded", "equilibrium", "given"]
 JointStart = Literal["given", "reference"]
 
@@ -17,11 +18,14 @@ JointStart = Literal["given", "reference"]
 class SignalShape:
     """The shape of a vector signal: its kind, and what it has per coordinate.
 
-    terms  sine: number of terms; polynomial: number of via points; table: 1 with a column, 0 (zero) without
+    terms  sine: number of terms; polynomial: number of via points; table and own: 1 for one that moves, 0 (zero)
+           without; of the base one for each of COORDINATES, of which zeros at the end may be left out
+    own    the user's class that it is, by its key in MOTIONS
     """
 
     kind: SignalKind = "none"
     terms: tuple[int, ...] = ()
+    own: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +38,8 @@ class Structure:
     effects        properties of sensors and motors, by name, in the order in which they act
     initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
                    told; on the reference they start with springs that carry the arm along it
+    mount          whether the arm's foot stands elsewhere than at the base's origin
+    mount_rpy      whether the arm's axes are turned against the base's
     """
 
     mechanism: str = "transfer_manipulator"
@@ -49,6 +55,13 @@ class Structure:
     effects: tuple[str, ...] = ()
     controller: str = "terminal_sliding"
     size: int = 0
+    mount: bool = False
+    mount_rpy: bool = False
+
+    @property
+    def base_coordinates(self) -> tuple[BaseCoordinate, ...]:
+        """What b, its rate and its acceleration have one entry of."""
+        return moving(self.base_motion.terms)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from springline.model import perturbation, signals
-from springline.model.base import COORDINATES, BaseMotion
+from springline.model.base import MOUNT, MOUNT_RPY, BaseState
 from springline.model.control import (
     A_MAX,
     CONTROLLERS,
@@ -52,7 +52,6 @@ from springline.model.quantities import (
     SIGMA,
     U_S,
     U_WISHED,
-    B,
     E,
     Entry,
     Quantity,
@@ -91,12 +90,30 @@ def own_control_tables(structure: Structure) -> dict[str, tuple[Parameter, ...]]
     }
 
 
+def _mount_symbols(vector: ParameterVector, structure: Structure) -> tuple[ca.SX | None, ca.SX | None]:
+    """Symbols of the mount's place and orientation, 3 x 1 each; None for one that is zero."""
+
+    def symbols(key: str, entries: Iterable[tuple[str, str, str]], meaning: str) -> ca.SX:
+        return ca.vertcat(
+            *(
+                vector.scalar(f"base_motion.{key}.{i}", f"{key}_{name}", unit, 0.0, f"{meaning}: {name}, {where}", REAL)
+                for i, (name, unit, where) in enumerate(entries)
+            )
+        )
+
+    return (
+        symbols("mount", MOUNT, "where the arm stands on the base") if structure.mount else None,
+        symbols("mount_rpy", MOUNT_RPY, "how the arm's axes are turned on the base") if structure.mount_rpy else None,
+    )
+
+
 class System:
     """Symbols, parameter slots and Functions of one structure.
 
     n       number of joints
     slots   meaning of each entry of p
     tables  layout of d
+    base_motion  motion, rate and acceleration of the base, in the coordinates that are there
     """
 
     def __init__(self, structure: Structure | None = None) -> None:
@@ -123,15 +140,19 @@ class System:
         self.t = ca.SX.sym("t")
         symbols = SignalSymbols(self.t, vector)
         reference = symbols.signal("reference", self.structure.reference, [(j.name, j.unit) for j in self.joints])
-        base = symbols.signal("base_motion", self.structure.base_motion, [(c.key, c.unit) for c in COORDINATES])
+        base = symbols.base_motion(self.structure.base_motion, self.joints)
         self.tables, self.d = symbols.tables, symbols.d
         self._signal_expressions = ca.vertcat(*signals.stack(reference), *signals.stack(base))
+        mount = _mount_symbols(vector, self.structure)
         self._initial = self._initial_values(vector)
         self.p = vector.sx
         self.slots: tuple[Slot, ...] = tuple(vector.slots)
 
         self.q1d, self.dq1d, self.ddq1d = (ca.SX.sym(item.name, n) for item in REFERENCE)
-        self.base = BaseMotion(*(ca.SX.sym(f"{item.name}b", len(COORDINATES)) for item in BASE))
+        moving = self.structure.base_coordinates
+        self.base_motion = tuple(replace(item, coordinates=moving) for item in BASE)
+        b, db, ddb = (ca.SX.sym(f"{item.name}b", len(moving)) for item in BASE)
+        self.base = BaseState(b, db, ddb, moving, *mount)
         self.w = ca.vertcat(self.q1d, self.dq1d, self.ddq1d, self.base.b, self.base.db, self.base.ddb)
         self._state: dict[Quantity, ca.SX] = {item: ca.SX.sym(item.name, n) for item in self.drive.state}
         self.q1, self.dq1 = self._state[Q1], self._state[DQ1]
@@ -230,7 +251,7 @@ class System:
     @property
     def columns(self) -> tuple[Quantity, ...]:
         """What a trajectory shows, in the order of the loop's rows."""
-        return (T, *self.drive.state, Q1D, E, *self.sliding, U, *self.controller_states, B)
+        return (T, *self.drive.state, Q1D, E, *self.sliding, U, *self.controller_states, self.base_motion[0])
 
     @property
     def trajectory(self) -> tuple[Entry, ...]:

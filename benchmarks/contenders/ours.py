@@ -27,8 +27,8 @@ _VALUES = {
     "reference.rotation.offset": 1.0,
     "reference.rotation.terms.0.amplitude": 1.0,
     "reference.rotation.terms.0.omega": problem.REFERENCE_OMEGA[1],
-    "base_motion.shake.0.amplitude": problem.SHAKE_AMPLITUDE,
-    "base_motion.shake.0.omega": problem.SHAKE_OMEGA,
+    "base_motion.heave.0.amplitude": problem.SHAKE_AMPLITUDE,
+    "base_motion.heave.0.omega": problem.SHAKE_OMEGA,
     "initial.q.0": problem.INITIAL_STATE[0],
     "initial.q.1": problem.INITIAL_STATE[1],
 }

@@ -19,7 +19,7 @@ from springline.codegen.nearest import nearest
 from springline.codegen.numbers import real as number
 from springline.codegen.program import Real, SignalTable, count_operations
 from springline.model.parameters import Slot
-from springline.model.quantities import BASE, DDQ1, DERIVATIVES, REFERENCE, SIGMA, E, Quantity, T, entries
+from springline.model.quantities import DDQ1, DERIVATIVES, REFERENCE, SIGMA, E, Quantity, T, entries
 from springline.model.structure import Structure
 from springline.model.system import System
 
@@ -164,10 +164,10 @@ def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
         **{name: force(name) for name in ("u", "u_s", "G", "C_dq1", "S", "z_bar", "eta", "u_f")},
         "dsigma": [(f"d{name}", f"{unit}^2") for name, unit in of(SIGMA)],
         "ddeta": force("ddeta", "/s^2"),
-        **{name: of(item) for name, item in zip(("b", "db", "ddb"), BASE, strict=True)},
+        **{name: of(item) for name, item in zip(("b", "db", "ddb"), system.base_motion, strict=True)},
         "t": of(T),
         "d": [(f"d{k}", "") for k in range(system.d.numel())],
-        "w": of(*REFERENCE, *BASE),
+        "w": of(*REFERENCE, *system.base_motion),
         "x": state,
         "y": [(f"measured_{name}", unit) for name, unit in state],
         "dx": of(*(DERIVATIVES[item] for item in system.drive.state)),

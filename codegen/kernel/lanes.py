@@ -27,7 +27,6 @@ from springline.codegen.program import (
     literal,
     print_operation,
 )
-from springline.model.base import COORDINATES
 from springline.model.quantities import entries
 
 # Functions with rare cases outside their fast path; slv_<name>_fast(x, &ok) clears ok where that does not hold.
@@ -84,7 +83,7 @@ class _Emitter:
         }
         n = program.system.n
         w = outputs["signals"][0]
-        self.observed = [*w[:n], *w[3 * n : 3 * n + len(COORDINATES)]]
+        self.observed = [*w[:n], *w[3 * n : 3 * n + program.system.base.b.numel()]]
         for wanted in (*self.state_functions.values(), self.observed, outputs["start"][0]):
             self._keep(wanted, Binding.STATE)
         self._keep(list(self.slots[Binding.VARYING]), Binding.VARYING)
@@ -105,7 +104,7 @@ class _Emitter:
                 if self.graph.nodes[i].binding is not Binding.CONSTANT:
                     names.setdefault(i, label)
 
-        base = [c.symbol for c in COORDINATES]
+        base = [c.symbol for c in system.structure.base_coordinates]
         symbols = {slot.key: slot.symbol for slot in system.slots}
         for i, node in enumerate(self.graph.nodes):
             kind, k = node.source

@@ -20,7 +20,7 @@ from typing import Literal
 
 import casadi as ca
 
-from springline.model.base import BaseMotion
+from springline.model.base import BaseState
 from springline.model.dynamics import newton_euler, rigid_bodies
 from springline.model.dynamics.lagrange import energies_of
 from springline.model.mechanisms import Mechanism, aligned
@@ -74,7 +74,7 @@ class _Terms:
 
 
 def equations_of_motion(
-    mechanism: Mechanism, q: ca.SX, dq: ca.SX, base: BaseMotion, p: Values, form: Form | None = None
+    mechanism: Mechanism, q: ca.SX, dq: ca.SX, base: BaseState, p: Values, form: Form | None = None
 ) -> EquationsOfMotion:
     """Derive (1); q, dq, and the entries of `base` and `p` are symbols.
 
@@ -84,7 +84,7 @@ def equations_of_motion(
     """
     omega, alpha, force = (ca.SX.sym(name, 3) for name in ("omega", "alpha", "gravity"))
     rest = base.rest_force(p.g)
-    symbols = ca.vertcat(q, dq, omega, alpha, force, *p.values())
+    symbols = ca.vertcat(q, dq, omega, alpha, force, *p.values(), base.constants)
     found: dict[Form, _Terms] = {}
     if form != "normal":
         found["factored"] = _factored(mechanism, q, dq, omega, alpha, force, rest, p)

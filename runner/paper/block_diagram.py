@@ -41,7 +41,7 @@ def _blocks(axes: Axes) -> None:
     _block(axes, (12.3, 2.35), (1.2, 0.8), "motor\n$M_2$", _PLANT)
     _block(axes, (10.65, 2.35), (1.0, 0.8), "spring\n$K$", _PLANT)
     _block(axes, (9.05, 2.35), (1.2, 0.8), "arm\n$M_1, C, G$", _PLANT)
-    _block(axes, (9.05, 0.6), (2.2, 0.75), "base motion\nshake, pitch, roll", _SOURCE)
+    _block(axes, (9.05, 0.6), (2.2, 0.75), "base motion\nsix coordinates", _SOURCE)
     for centre in ((2.4, 4.9), (6.65, 4.9), (9.4, 4.9)):
         axes.add_patch(Circle(centre, _RADIUS, facecolor="white", edgecolor=_INK, linewidth=0.9, zorder=3))
 

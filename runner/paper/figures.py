@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from springline.model.base import COORDINATES
+from springline.model.base import PAPER_COORDINATES
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import Joint
 from springline.model.quantities import DQ1, DQ1D, Q1, Q1D, SIGMA, E, Quantity
@@ -210,7 +210,7 @@ def _linear_surface(study: Study) -> Figure:
 def _base_oscillations(study: Study) -> Figure:
     figure = Figure(figsize=(PAGE, 3.3))
     rows = figure.subplots(3, 1, sharex=True)
-    for axes, (name, run, line), coordinate in zip(rows, _curves(study, 1), COORDINATES, strict=True):
+    for axes, (name, run, line), coordinate in zip(rows, _curves(study, 1), PAPER_COORDINATES, strict=True):
         unit, scale = ("°", 180 / math.pi) if coordinate.unit == "rad" else (coordinate.unit, 1.0)
         draw(axes, run["t"], scale * run[coordinate.symbol], name, **_solid(line))
         axes.set_ylabel(label(name, unit))

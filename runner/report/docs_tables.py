@@ -2,8 +2,9 @@
 
     python -m runner.report.docs_tables [--write]
 
-Prints the columns of a trajectory and the metrics of a run of the packaged arm; --write (`make docs-tables`) puts them
-into docs/scenarios.md, between the comments that name them. The text around them is written by hand.
+Prints the columns of a trajectory, on a base that moves in every way, and the metrics of a run of the packaged arm;
+--write (`make docs-tables`) puts them into docs/scenarios.md, between the comments that name them. The text around them
+is written by hand.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from springline.model.base import COORDINATES
 from springline.model.parameters import Joint
 from springline.model.quantities import METRICS, Quantity
+from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 
 SCENARIOS_PAGE = Path(__file__).parents[2] / "docs" / "scenarios.md"
@@ -54,7 +57,7 @@ def cell(text: str) -> str:
 
 def tables() -> dict[str, str]:
     """The tables by name."""
-    system = System()
+    system = System(Structure(base_motion=SignalShape("sine", (1,) * len(COORDINATES))))
     return {"trajectory": table(system.columns, system.joints), "metrics": table(METRICS, system.joints)}
 
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from springline.model.base import COORDINATES, BaseCoordinate
+from springline.model.base import BaseCoordinate
 from springline.model.parameters import Joint
 from springline.model.quantities import Q1, Q2, SIGMA, E, Quantity, U
 from springline.runner.files import units
@@ -81,7 +81,7 @@ class _Run:
         self._units = units(result.trajectory)
         self.t = self["t"]
         self.moving: tuple[BaseCoordinate, ...] = tuple(
-            c for c in COORDINATES if np.max(np.abs(self[c.symbol])) > _MOVES
+            c for c in scenario.structure().base_coordinates if np.max(np.abs(self[c.symbol])) > _MOVES
         )
 
     def __getitem__(self, column: str) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
@@ -11,12 +12,13 @@ from typing import Any, cast
 import numpy as np
 
 from springline.codegen.kernel import MOST_STEPS
-from springline.model.base import COORDINATES
+from springline.model.base import ALIASES, COORDINATES
 from springline.model.drive import DRIVES, DriveKind
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE
 from springline.runner.files import InputError, Problem, unknown
 from springline.runner.scenario import schema
+from springline.runner.scenario.dotted import BY_COORDINATE, respelled, respellings
 from springline.runner.scenario.locate import canonical_path, read_signal_file
 from springline.runner.scenario.signal_csv import HALF_TURN, UNITS, Column
 from springline.runner.scenario.signal_tables import TableRead, excess_notes, read_table
@@ -48,6 +50,7 @@ def resolve(
         else:
             problems.append(Problem(where, name, "expected a table", schema.given_text(table)))
             given[name] = {}
+    given["base_motion"], given_names = _by_its_names(given["base_motion"], where, problems)
     code, names = _opened_doors(given, folder, where, problems)
     mechanism = names["mechanism.name"]
     # Which keys are valid depends on all that was chosen, and on the drive, whose kind decides what it can be told.
@@ -55,8 +58,9 @@ def resolve(
     drive = cast(DriveKind, drive if drive in DRIVES else schema.DEFAULT_KINDS["drive"])
     size = size_given(mechanism, given["mechanism"])
     joints = MECHANISMS[mechanism].of_size(size).joints
+    motion = names["base_motion.kind"] if schema.names_file(given["base_motion"].get("kind")) else ""
     try:
-        shape = schema.schema(mechanism, drive, names["control.controller"], names["control.law"], size)
+        shape = schema.schema(mechanism, drive, names["control.controller"], names["control.law"], size, motion)
     except ValueError as error:
         raise InputError(*problems, Problem(where, "control", str(error))) from error
 
@@ -66,7 +70,10 @@ def resolve(
     for name in schema.TABLES:
         section = shape.sections.get(name)
         if section is None:
-            chosen = _section_of_kind(shape.kinds[name], schema.DEFAULT_KINDS[name], given[name], name, where)
+            kinds = dict(shape.kinds[name])
+            if name == "base_motion" and motion:
+                kinds[given[name]["kind"]] = kinds.pop(motion)
+            chosen = _section_of_kind(kinds, schema.DEFAULT_KINDS[name], given[name], name, where)
             if isinstance(chosen, list):
                 problems += chosen
                 document[name] = {}
@@ -103,7 +110,7 @@ def resolve(
         except InputError as error:
             problems += error.problems
     if problems:
-        raise InputError(*problems)
+        raise InputError(*(replace(problem, key=respelled(problem.key, given_names)) for problem in problems))
     return document, tuple(tables), tuple(notes), code
 
 
@@ -111,6 +118,25 @@ def size_given(mechanism: str, table: Mapping[str, object]) -> int:
     """How many joints a [mechanism] table asks for; 0 for as many as there are, or where it asks for what is none."""
     size = table.get(schema.SIZE)
     return size if isinstance(size, int) and size in MECHANISMS[mechanism].sizes else 0
+
+
+def _by_its_names(table: dict[str, Any], where: str, problems: list[Problem]) -> tuple[dict[str, Any], dict[str, str]]:
+    """[base_motion] with each coordinate by its own name, and which keys were given by another (`respellings`)."""
+    keys: list[str] = []
+
+    def renamed(given: dict[str, Any], key: str) -> dict[str, Any]:
+        keys.extend(f"{key}.{item}" for item in given)
+        for alias, name in ALIASES.items():
+            if alias in given and name in given:
+                text = f"is another name of {key}.{name}: give one of them"
+                problems.append(Problem(where, f"{key}.{alias}", text))
+        return {ALIASES.get(item, item): value for item, value in given.items()}
+
+    table = renamed(table, "base_motion")
+    for inner in BY_COORDINATE:
+        if isinstance(table.get(inner), dict):
+            table[inner] = renamed(table[inner], f"base_motion.{inner}")
+    return table, respellings(keys)
 
 
 def _opened_doors(
@@ -264,12 +290,20 @@ def _whole_problems(document: Document, key: str, where: str) -> list[Problem]:
 
 
 def _columns(table: dict[str, Any], name: str, units: Mapping[str, str], folder: Path, where: str) -> list[Column]:
-    """What [reference] or [base_motion] reads of its file, the time first; makes path and units in `table` explicit."""
-    columns, chosen = table["columns"], table["units"]
+    """What [reference] or [base_motion] reads of its file, the time first.
+
+    Makes path and units in `table` explicit, and drops a scale that says nothing.
+    """
+    columns, chosen, scale = table["columns"], table["units"], table["scale"]
     si = {"t": "s", **units}
     problems = [
         Problem(where, f"{name}.units.{key}", f"there is no columns.{key} that has this unit")
         for key in chosen
+        if key not in columns
+    ]
+    problems += [
+        Problem(where, f"{name}.scale.{key}", f"there is no columns.{key} that it could be a factor on")
+        for key in scale
         if key not in columns
     ]
     if len(columns) == 1:
@@ -277,6 +311,8 @@ def _columns(table: dict[str, Any], name: str, units: Mapping[str, str], folder:
         problems.append(Problem(where, key, f"expected a column for at least one of {', '.join(units)}"))
     if problems:
         raise InputError(*problems)
+    if not scale:
+        del table["scale"]
     table["units"] = chosen = {key: chosen.get(key, si[key]) for key in si if key in columns}
     key = f"{name}.path"
     table["path"] = canonical_path(table["path"], folder, where, key)
@@ -284,7 +320,7 @@ def _columns(table: dict[str, Any], name: str, units: Mapping[str, str], folder:
         Column(
             columns[item],
             f"{name}.columns.{item}",
-            UNITS.get(si[item], {}).get(unit, 1.0),
+            UNITS.get(si[item], {}).get(unit, 1.0) * scale.get(item, 1.0),
             HALF_TURN.get(unit, math.inf),
             unit,
         )

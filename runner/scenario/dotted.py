@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from springline.codegen.numbers import doubles
+from springline.model.base import ALIASES
 from springline.runner.files import shortened
 
 _LONGEST_PATH = 16  # no document has keys of ten parts, and each part is a call
@@ -18,6 +19,43 @@ def expect_keys(given: object, example: str) -> None:
     """Raise TypeError for what is no mapping of dotted keys to something, as `example` is one."""
     if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
         raise TypeError(f"expected {example}, got {shortened(repr(given))}")
+
+
+BY_COORDINATE = ("columns", "units", "scale")
+"""Tables in [base_motion] whose keys are its coordinates."""
+
+
+def canonical_key(key: str) -> str:
+    """A key by the names that things have in a resolved scenario: "base_motion.shake" -> "base_motion.heave"."""
+    for name, other in respellings([key]).items():
+        return name + key[len(other) :]
+    return key
+
+
+def respellings(keys: Iterable[str]) -> dict[str, str]:
+    """Which keys, or beginnings of keys, are given by another name: "base_motion.heave" -> "base_motion.shake"."""
+    found = {}
+    for key in keys:
+        table, *parts = key.split(".")
+        head = [table, *parts[:1]] if parts[:1] and parts[0] in BY_COORDINATE else [table]
+        rest = key.split(".")[len(head) :]
+        if table == "base_motion" and rest and rest[0] in ALIASES:
+            found[".".join([*head, ALIASES[rest[0]]])] = ".".join([*head, rest[0]])
+    return found
+
+
+def respelled(key: str, given: Mapping[str, str]) -> str:
+    """A canonical key as it was given, by what `respellings` found."""
+    for name, other in given.items():
+        if key == name or key.startswith(f"{name}."):
+            return other + key[len(name) :]
+    return key
+
+
+def other_spellings(key: str) -> list[str]:
+    """What else a canonical key may be called."""
+    aliases = {f"base_motion.{name}": f"base_motion.{alias}" for alias, name in ALIASES.items()}
+    return [spelled for spelled in [respelled(key, aliases)] if spelled != key]
 
 
 def scale_key(key: str) -> str:

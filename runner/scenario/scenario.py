@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from os import PathLike
 from pathlib import Path
@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from springline.codegen.kernel import lanes
 from springline.codegen.numbers import doubles
 from springline.codegen.program import program
-from springline.model.base import COORDINATES
+from springline.model.base import COORDINATES, shortest
+from springline.model.base_motion import MOTIONS, moving_terms
 from springline.model.control import CONTROLLERS, LAWS, LogForm, SurfaceExponents
 from springline.model.drive import DRIVES, DriveKind
 from springline.model.mechanisms import MECHANISMS
@@ -26,7 +27,17 @@ from springline.model.system import System
 from springline.runner.files import InputError, Problem, document_text, read_toml, shortened, unknown
 from springline.runner.scenario import schema
 from springline.runner.scenario.checking import Document, resolve, size_given
-from springline.runner.scenario.dotted import expect_keys, flat, plain, replaced, scale_key
+from springline.runner.scenario.dotted import (
+    canonical_key,
+    expect_keys,
+    flat,
+    other_spellings,
+    plain,
+    replaced,
+    respelled,
+    respellings,
+    scale_key,
+)
 from springline.runner.scenario.locate import expect_kind, read_scenario, relative_path
 from springline.runner.scenario.splines import Spline
 from springline.runner.scenario.user_code import UserClass, canonical_reference, load_class, read_class, told
@@ -143,7 +154,7 @@ class Scenario:
     # What the model is told
 
     def registered(self, name: str) -> str:
-        """What a mechanism, controller or law that the document names is registered as."""
+        """What a mechanism, controller, law or base motion that the document names is registered as."""
         return next((user.key for user in self.code if user.reference == name), name)
 
     def structure(self) -> Structure:
@@ -160,13 +171,23 @@ class Scenario:
             log_form=cast(LogForm, control["log_form"]),
             exponents=SurfaceExponents(**{name: control[name] for name in ("l", "m", "p", "r")}),
             reference=_shape(self.document["reference"], joints),
-            base_motion=_shape(self.document["base_motion"], [c.key for c in COORDINATES]),
+            base_motion=self._base_motion(),
+            mount=any(self.document["base_motion"]["mount"]),
+            mount_rpy=any(self.document["base_motion"]["mount_rpy"]),
             initial_motor=cast(MotorStart, motor if isinstance(motor, str) else "given"),
             drive=cast(DriveKind, self.document["drive"]["kind"]),
             start="reference" if initial.get("on_reference") else "given",
             integrator=self.integrator,
             size=size,
         )
+
+    def _base_motion(self) -> SignalShape:
+        table = self.document["base_motion"]
+        own = self.registered(table["kind"])
+        if own in MOTIONS:
+            return SignalShape("own", shortest(moving_terms(MOTIONS[own])), own)
+        shape = _shape(table, [c.key for c in COORDINATES])
+        return replace(shape, terms=shortest(shape.terms))
 
     def system(self) -> System:
         """The System of the structure; the same object for equal structures."""
@@ -185,13 +206,14 @@ class Scenario:
 
         Raises InputError if there is no such key.
         """
+        name = canonical_key(key)
         try:
-            return self._slot(key, self._numbers)
+            return self._slot(name, self._numbers)
         except KeyError:
             entries = dict(flat(self.document))
-        if key not in entries:
+        if name not in entries:
             raise InputError(unknown(self.source, key, "key", key, [*entries, *self.numeric_keys()]))
-        return entries[key]
+        return entries[name]
 
     def numeric_keys(self) -> dict[str, NumericKey]:
         """Every number that may vary within the structure, by dotted key.
@@ -286,6 +308,7 @@ class Scenario:
         if not overrides:
             return self
         where = _overridden(self.source)
+        given = respellings(overrides)
         overrides = self._canonical(overrides, where)
         document = self._without_excluded(overrides)
         problems = []
@@ -299,7 +322,12 @@ class Scenario:
                 problems.append(Problem(where, key, f"expected a value that TOML can hold: {error}"))
         if problems:
             raise InputError(*problems)
-        changed = Scenario(self.source, self.folder, *resolve(document, where, self.folder, read=read))
+        try:
+            resolved = resolve(document, where, self.folder, read=read)
+        except InputError as error:
+            renamed = (replace(problem, key=respelled(problem.key, given)) for problem in error.problems)
+            raise InputError(*renamed) from error
+        changed = Scenario(self.source, self.folder, *resolved)
         if read:
             changed.expect_computable(where)
         return changed
@@ -339,9 +367,17 @@ class Scenario:
             raise InputError(Problem(where, key, f"{owner}{text} {sizes[0]:.3g}"))
 
     def _canonical(self, overrides: Mapping[str, object], where: str) -> dict[str, object]:
-        """Overrides that name users' classes as the document does, so that the same one is known for the same."""
+        """Overrides with keys and users' classes named as the document does, so that the same is known for the same.
+
+        Raises InputError for what is given by two names.
+        """
+        named = {key: canonical_key(key) for key in overrides}
+        twice = [key for key, name in named.items() if key != name and name in overrides]
+        if twice:
+            text = "is another name of {}: give one of them"
+            raise InputError(*(Problem(where, key, text.format(named[key])) for key in twice))
         return {
-            key: canonical_reference(str(value), self.folder, where, key)
+            named[key]: canonical_reference(str(value), self.folder, where, key)
             if key in schema.DOOR_KEYS and schema.names_file(value)
             else value
             for key, value in overrides.items()
@@ -366,7 +402,8 @@ class Scenario:
         for table in ("reference", "base_motion"):
             kind = overrides.get(f"{table}.kind", document[table]["kind"])
             if kind != document[table]["kind"]:
-                document[table] = {"kind": kind}
+                stays = {key: document[table][key] for key in ("mount", "mount_rpy") if key in document[table]}
+                document[table] = {"kind": kind} | stays
         if overrides.get("control.mode") == "continuous":
             document["control"].pop("period", None)
         for name, registry in (("controller", CONTROLLERS), ("law", LAWS)):
@@ -501,13 +538,14 @@ def _numeric_keys(structure: Structure) -> dict[str, NumericKey]:
         if slot.key.startswith("initial.") and _is_idle(slot.key, structure):
             continue
         unit = schema.unit_text(slot.unit, system.joints)
-        keys[slot.key] = NumericKey(unit, slot.bounds, slot.meaning, (slot.key,))
+        for key in (slot.key, *other_spellings(slot.key)):
+            keys[key] = NumericKey(unit, slot.bounds, slot.meaning, (slot.key,))
         if slot.key.startswith("plant."):
             scale = scale_key(slot.key)
             keys[scale] = NumericKey("1", POSITIVE, f"{slot.meaning}, as a factor on the controller's", (scale,))
     for key in keys:
         stem, _, last = key.rpartition(".")
-        if last.isdigit():
+        if last.isdigit() and not stem.startswith("base_motion."):
             groups.setdefault(stem, []).append(key)
     for stem, leaves in groups.items():
         units = " or ".join(dict.fromkeys(keys[leaf].unit for leaf in leaves))

@@ -5,6 +5,7 @@ Names, units, bounds and defaults of everything numeric come from the model's de
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -15,7 +16,8 @@ from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_sc
 
 from springline.codegen.kernel import MOST_STEPS
 from springline.codegen.numbers import double
-from springline.model.base import COORDINATES
+from springline.model.base import COORDINATES, MOUNT, MOUNT_RPY
+from springline.model.base_motion import MOTIONS
 from springline.model.control import CONTROLLERS, LARGEST_SURFACE_EXPONENT, LAWS, LogForm
 from springline.model.drive import DRIVES, EPSILON, DriveKind
 from springline.model.integrators import INTEGRATORS
@@ -192,6 +194,36 @@ def door(kind: str, registry: Registry[Any]) -> Leaf:
     return Leaf(f'{choice(kind, registry).expected} or "FILE.py:CLASS"', check)
 
 
+def scale() -> Leaf:
+    """A factor on the numbers of a column."""
+    expected = "a finite number other than 0, -1.0 for a column of the other sign"
+
+    def check(value: object) -> float:
+        try:
+            if math.isfinite(double(value)) and double(value) != 0.0:
+                return double(value)
+        except (TypeError, ValueError):
+            pass
+        raise _wrong(f"expected {expected}")
+
+    return Leaf(expected, check)
+
+
+def triple(entries: Sequence[tuple[str, str, str]]) -> Leaf:
+    """A list of three numbers, each with a name, a unit and a meaning."""
+    names = ", ".join(f"{name} ({meaning})" for name, _, meaning in entries)
+    expected = f"a list of three finite numbers [{entries[0][1]}]: {names}"
+    numbers = [number(unit) for _, unit, _ in entries]
+
+    def check(value: object) -> list[float]:
+        if not isinstance(value, list) or len(value) != len(numbers):
+            raise _wrong(f"expected {expected}")
+        pairs = enumerate(zip(numbers, value, strict=True))
+        return [_checked(item, entry, item.expected, at=(i,), given=entry) for i, (item, entry) in pairs]
+
+    return Leaf(expected, check)
+
+
 def several(item: Leaf) -> Leaf:
     """A list of at least one."""
     expected = f"a list, not empty, each {item.expected}"
@@ -265,12 +297,6 @@ BANDS = (("response_band", "response_error"), ("settling_band", "settling_error"
 DEFAULT_BANDS = {"response_band": 0.10, "settling_band": 0.05}
 
 
-class NoMotion(Section):
-    """kind = "none"."""
-
-    kind: Literal["none"]
-
-
 @dataclass(frozen=True)
 class Schema:
     """The tables of a scenario for one mechanism and kind of drive.
@@ -294,6 +320,7 @@ DOORS: Mapping[tuple[str, str], tuple[Registry[Any], str]] = {
     ("mechanism", "name"): (MECHANISMS, _DEFAULT.mechanism),
     ("control", "controller"): (CONTROLLERS, _DEFAULT.controller),
     ("control", "law"): (LAWS, _DEFAULT.law),
+    ("base_motion", "kind"): (MOTIONS, _DEFAULT.base_motion.kind),
 }
 """Table and key that may name a class of a user's file -> what else it may name, and what it is by default."""
 DOOR_KEYS = tuple(f"{table}.{key}" for table, key in DOORS)
@@ -302,11 +329,17 @@ DOOR_KEYS = tuple(f"{table}.{key}" for table, key in DOORS)
 
 @lru_cache
 def schema(
-    name: str, drive: DriveKind, controller: str = _DEFAULT.controller, law: str = _DEFAULT.law, size: int = 0
+    name: str,
+    drive: DriveKind,
+    controller: str = _DEFAULT.controller,
+    law: str = _DEFAULT.law,
+    size: int = 0,
+    motion: str = "",
 ) -> Schema:
     """The schema for the mechanism, kind of drive, controller and law that are registered as such.
 
-    size  how many joints the mechanism has, 0 for as many as it has by default
+    size    how many joints the mechanism has, 0 for as many as it has by default
+    motion  what a base motion of a user's own is registered as, which is then a kind too; "" if there is none
     Raises ValueError for a controller or law whose table [control.<its name>] would be a key that there is already.
     """
     mechanism = MECHANISMS[name].of_size(size)
@@ -327,8 +360,6 @@ def schema(
     }
     if drive == "rigid":
         del initial["q_motor"]
-    coordinates = {c.key: c.unit for c in COORDINATES}
-    sines: dict[str, Any] = {key: (_terms(unit), []) for key, unit in coordinates.items()}
     return Schema(
         sections={
             "mechanism": _section("mechanism", {"name": named, **_size(mechanism), **_numbers(arm, joints)}),
@@ -344,11 +375,7 @@ def schema(
                 "polynomial": _reference_polynomials(mechanism),
                 "table": _table_section({joint.name: joint.unit for joint in joints}),
             },
-            "base_motion": {
-                "none": NoMotion,
-                "sine": _section("sine", {"kind": (Literal["sine"], ...), **sines}),
-                "table": _table_section(coordinates),
-            },
+            "base_motion": _base_motion_sections(motion, joints),
         },
     )
 
@@ -358,6 +385,22 @@ def _size(mechanism: Mechanism) -> dict[str, Any]:
     if not mechanism.sizes:
         return {}
     return {SIZE: (Annotated[int, one_of(mechanism.sizes, "number of joints")], len(mechanism.joints))}
+def _base_motion_sections(motion: str, joints: Sequence[Joint]) -> dict[str, type[Section]]:
+    """[base_motion] by kind; an arm stands somewhere on a base that is at rest, too."""
+    mount: dict[str, Any] = {
+        "mount": (Annotated[Any, triple(MOUNT)], [0.0, 0.0, 0.0]),
+        "mount_rpy": (Annotated[Any, triple(MOUNT_RPY)], [0.0, 0.0, 0.0]),
+    }
+    sines: dict[str, Any] = {c.key: (_terms(c.unit), []) for c in COORDINATES}
+    sections = {
+        "none": _section("none", {"kind": (Literal["none"], ...), **mount}),
+        "sine": _section("sine", {"kind": (Literal["sine"], ...), **sines, **mount}),
+        "table": _table_section({c.key: c.unit for c in COORDINATES}, mount),
+    }
+    if motion:
+        kind = {"kind": (Annotated[str, text()], ...)}
+        sections[motion] = _section("own", {**kind, **_numbers(MOTIONS[motion].parameters, joints), **mount})
+    return sections
 
 
 def _own_tables(own: Mapping[str, Iterable[Parameter]], joints: Sequence[Joint]) -> dict[str, Any]:
@@ -438,11 +481,12 @@ def _reference_polynomials(mechanism: Mechanism) -> type[Section]:
     return _section("polynomial", fields)
 
 
-def _table_section(units: Mapping[str, str]) -> type[Section]:
+def _table_section(units: Mapping[str, str], others: Mapping[str, Any] | None = None) -> type[Section]:
     """A signal from a CSV file: a column for the time and any of the coordinates, whose SI units are `units`."""
     names = {key: (Annotated[str | None, text()], None) for key in units}
     columns = _section("columns", {"t": (Annotated[str, text()], ...), **names})
     known = {key: choice("unit", UNITS.get(si, {si: 1.0})) for key, si in {"t": "s", **units}.items()}
+    scales = _section("scale", {key: (Annotated[float | None, scale()], None) for key in units})
     in_units = _section("units", {key: (Annotated[str | None, leaf], None) for key, leaf in known.items()})
     return _section(
         "table",
@@ -451,9 +495,11 @@ def _table_section(units: Mapping[str, str]) -> type[Section]:
             "path": (Annotated[str, text()], ...),
             "columns": (columns, ...),
             "units": (in_units, Field(default_factory=in_units)),
+            "scale": (scales, Field(default_factory=scales)),
             "t0": (Annotated[float, number("s")], 0.0),
             "ends": (Annotated[str, choice("ends", ENDS)], ENDS[0]),
             "max_gap": (Annotated[float | None, number("s", POSITIVE)], None),
+            **(others or {}),
         },
     )
 

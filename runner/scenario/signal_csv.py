@@ -58,7 +58,7 @@ class Column:
     """A column of a CSV file.
 
     name, key  its name there, and the scenario key that asks for it
-    factor     its unit in SI units
+    factor     what its numbers are multiplied with to be in SI units, negative where they have the other sign
     half_turn  half a turn in its unit if it is an angle, else inf
     unit       its unit by name, "" if that is of no interest
     """
@@ -111,7 +111,7 @@ def read_samples(data: bytes, file: str, columns: Sequence[Column], where: str, 
             problems.append(Problem(where, column.key, f"{place}: {_number_expected(cells[bad])}", repr(cells[bad])))
             continue
         numbers[:, i] = list(map(float, cells))
-        digits.append(_digit(cells) * column.factor)
+        digits.append(_digit(cells) * abs(column.factor))
     if problems:
         raise InputError(*problems)
     notes += [note for i, column in enumerate(columns) if (note := _unwrap(numbers[:, i], lines, file, column))]

@@ -329,7 +329,12 @@ def told(users: Mapping[UserClass, str], where: str) -> Iterator[None]:
 
 def _blamed(error: BaseException, users: Mapping[UserClass, str]) -> UserClass:
     """Whose lines an error came from, or else whose kind it begins with: "law my_law: rate: ..."."""
-    kinds = {"mechanism.name": "mechanism", "control.law": "law", "control.controller": "controller"}
+    kinds = {
+        "mechanism.name": "mechanism",
+        "control.law": "law",
+        "control.controller": "controller",
+        "base_motion.kind": "base motion",
+    }
     lines = [user for user in users if _lines(error, user)]
     named = [user for user, key in users.items() if str(error).startswith(f"{kinds[key]} ")]
     return [*lines, *named, *users][0]

@@ -19,8 +19,12 @@ def structure_of(mechanism: str, **changes: Any) -> Structure:
 def values_of(structure: Structure) -> np.ndarray:
     """The mechanism's own reference and start, under a base that moves; U_max low enough to limit now and then."""
     arm = MECHANISMS[structure.mechanism]
-    given = {"base_motion.shake.0.amplitude": 0.1, "base_motion.shake.0.omega": 9.0,
+    given = {"base_motion.heave.0.amplitude": 0.1, "base_motion.heave.0.omega": 9.0,
              "base_motion.pitch.0.amplitude": 0.05, "base_motion.pitch.0.omega": 3.0}  # fmt: skip
+    given |= {f"base_motion.{key}.0.amplitude": 0.2 for key in ("surge", "sway", "yaw")}
+    given |= {f"base_motion.{key}.0.omega": 5.0 for key in ("surge", "sway", "yaw")}
+    given |= {f"base_motion.mount.{i}": value for i, value in enumerate((4.0, 2.0, -1.5))}
+    given |= {f"base_motion.mount_rpy.{i}": value for i, value in enumerate((0.2, -0.1, 0.7))}
     for i, joint in enumerate(arm.joints):
         given |= {f"initial.q.{i}": arm.start_position[i], f"reference.{joint.name}.offset": arm.reference_offset[i]}
         for k, term in enumerate(arm.reference_terms[i]):

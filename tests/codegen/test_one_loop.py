@@ -192,6 +192,63 @@ def test_other_arms_are_exported_as_c_that_checks_itself(
         assert foreign not in texts
 
 
+SHIP = {"base_motion": SignalShape("sine", (1,) * 6), "mount": True, "mount_rpy": True}
+
+
+def test_an_arm_mounted_on_a_ship_in_six_degrees_has_the_same_bits_everywhere(tmp_path: Path) -> None:
+    """Lanes, CasADi's C, both FMUs, the exported step and plant step; and a base that is another is another run."""
+    structure = structure_of("transfer_manipulator", **SHIP)
+    for sampled, version in ((True, 2), (False, 3)):
+        rows = rows_of(structure, sampled, width=4, groups=2)
+        np.testing.assert_array_equal(rows, rows_of(structure, sampled, engine="casadi"))
+        expected = of_state_and_command(structure, rows)
+        np.testing.assert_array_equal(fmu_rows(structure, sampled, version, tmp_path), expected)
+    for without in ({"mount": False}, {"mount_rpy": False}, {"base_motion": SignalShape("sine", (1,) * 5)}):
+        other = rows_of(structure_of("transfer_manipulator", **SHIP | without), False, width=4, groups=2)
+        assert np.max(np.abs(of_state_and_command(structure, other) - expected)) > 1e-4, without
+    sampled_rows = rows_of(structure, True, every=100)
+    n = len(MECHANISMS["transfer_manipulator"].joints)
+    wanted = np.hstack([sampled_rows[:, 1 : 1 + n], sampled_rows[:, 1 + 7 * n : 1 + 8 * n]])  # q1 and U
+    np.testing.assert_array_equal(exported_rows(structure, tmp_path)[: len(wanted)], wanted)
+
+
+def test_exported_c_of_a_ship_has_what_moves_and_checks_itself(tmp_path: Path) -> None:
+    structure = structure_of("transfer_manipulator", **SHIP | {"base_motion": SignalShape("sine", (1, 1, 1, 0, 0, 1))})
+    folder = tmp_path / "c"
+    tunable = ["base_motion"]
+    write_tree(folder, *generate_files(bind(structure, values_of(structure), tunable=tunable)))
+    header = (folder / "include" / "springline.h").read_text()
+    for member, told in (
+        ("dd_yaw;", "rad/s^2; acceleration of the base: yaw, bow to port"),
+        ("mount_z;", "m; where the arm stands on the base: z, to starboard"),
+        ("mount_rpy_yaw;", "rad; how the arm's axes are turned on the base: yaw, about y"),
+        ("base_motion_shake_0_amplitude;", "m; amplitude of heave term 0"),
+    ):
+        (line,) = (line for line in header.splitlines() if f" {member}" in line)
+        assert told in line
+    assert "surge" not in header and "sway" not in header
+    sources = [folder / "src" / "springline.c", folder / "src" / "springline_model.c", folder / "self_check.c"]
+    warnings = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", *QUICK, "-ffp-contract=off"]
+    includes = [f"-I{folder}/include", f"-I{folder}/src"]
+    subprocess.run(["cc", *warnings, *includes, *sources, "-o", tmp_path / "check"], check=True)
+    checked = [tmp_path / "check", folder / "test_vectors.txt"]
+    done = subprocess.run(checked, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("part", ["plant", "loop"])
+def test_fmus_of_a_ship_are_valid(part: Any, version: Any, tmp_path: Path) -> None:
+    structure = structure_of("transfer_manipulator", **SHIP)
+    settings = Settings(duration=1.0, step=STEP, period=1e-3)
+    content = fmu(structure, values_of(structure), settings, part=part, version=version, identifier="a", name="a")
+    described = zipfile.ZipFile(io.BytesIO(content)).read("modelDescription.xml").decode()
+    for name in ("surge", "dd_sway", "d_yaw", "y_r1"):
+        assert f'name="{name}"' in described
+    (tmp_path / "a.fmu").write_bytes(content)
+    assert client_library("fmpy.validation").validate_fmu(str(tmp_path / "a.fmu")) == []
+
+
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("part", ["controller", "plant", "loop"])
 def test_fmus_of_another_arm_are_valid(part: Any, version: Any, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """What the tests of the model share: a system called with NumPy, and the mechanics derived a second way."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pytest
@@ -87,7 +87,7 @@ def rk4() -> Callable[[Callable[[float, Array], Array], Array, float, int], Arra
 
 
 class Inertial:
-    """The arm on a base that shakes, pitches and rolls at once, derived by SymPy in the inertial frame.
+    """The arm on a base that moves in several coordinates at once, derived by SymPy in the inertial frame.
 
     Positions are written in inertial coordinates and differentiated with respect to time; no moving frame, no
     equivalence of gravity and acceleration. Each attribute is a NumPy function of
@@ -99,24 +99,30 @@ class Inertial:
     base_power  Newton-Euler: rate of work done on the arm by the motion of the base frame
     """
 
-    names = ("m2", "m3", "J", "L1", "L3", "g")
+    names: tuple[str, ...] = ("m2", "m3", "J", "L1", "L3", "g")
+    base = 3
 
     def __init__(self) -> None:
-        coordinates, rates, accelerations = (sp.symbols(f"c0:5_{order}") for order in range(3))
-        y, theta, shake, pitch, roll = coordinates
-        m2, m3, J, L1, L3, g = parameters = sp.symbols(" ".join(self.names))
+        coordinates, rates, accelerations = (sp.symbols(f"c0:{2 + self.base}_{order}") for order in range(3))
+        y, theta = coordinates[:2]
+        parameters = sp.symbols(" ".join(self.names))
+        m2, m3, J, L1, L3, g = parameters[:6]
 
         def ddt(expression: sp.Matrix) -> sp.Matrix:
             """The total derivative with respect to time."""
             chain = [*zip(coordinates, rates, strict=True), *zip(rates, accelerations, strict=True)]
             return sum((expression.diff(c) * dc for c, dc in chain), 0 * expression)
 
-        rotation = sp.rot_ccw_axis3(pitch) * sp.rot_ccw_axis1(roll)
         up = sp.Matrix([0, 1, 0])
-        stood = [sp.Matrix([L1, y, 0]), sp.Matrix([L1 + L3 * sp.cos(theta), y + L3 * sp.sin(theta), 0])]
-        positions = [shake * up + rotation * r for r in stood]
+        origin, rotation = self.frame(coordinates[2:])
+        foot, standing = self.stand(parameters[6:])
+        arm = [sp.Matrix([L1, y, 0]), sp.Matrix([L1 + L3 * sp.cos(theta), y + L3 * sp.sin(theta), 0])]
+        stood = [foot + standing * r for r in arm]
+        positions = [origin + rotation * r for r in stood]
         velocities = [ddt(r) for r in positions]
-        omega_z = (rotation.T * ddt(rotation))[1, 0]
+        spin = rotation.T * ddt(rotation)
+        omega = sp.Matrix([spin[2, 1], spin[0, 2], spin[1, 0]])
+        omega_z = (standing.T * omega)[2]
         turning = rates[1] + omega_z
 
         kinetic, potential = J * turning**2 / 2, sp.Integer(0)
@@ -124,11 +130,11 @@ class Inertial:
         for m, r, v, s in zip((m2, m3), positions, velocities, stood, strict=True):
             kinetic += m * v.dot(v) / 2
             potential += m * g * r[1]
-            carried += m * (ddt(v) + g * up).dot(rates[2] * up + ddt(rotation) * s)
+            carried += m * (ddt(v) + g * up).dot(ddt(origin) + ddt(rotation) * s)
         lagrangian = kinetic - potential
         left = [ddt(lagrangian.diff(rates[i])) - lagrangian.diff(coordinates[i]) for i in range(2)]
 
-        arguments = [s[part] for part in (slice(0, 2), slice(2, 5)) for s in (coordinates, rates, accelerations)]
+        arguments = [s[part] for part in (slice(0, 2), slice(2, None)) for s in (coordinates, rates, accelerations)]
 
         def compiled(*expressions: sp.Expr) -> Callable[..., Array]:
             function = sp.lambdify([*arguments, parameters], expressions, cse=True)
@@ -139,10 +145,44 @@ class Inertial:
         self.power = compiled(ddt(kinetic + potential))
         self.base_power = compiled(carried)
 
+    def frame(self, b: Sequence[sp.Symbol]) -> tuple[sp.Matrix, sp.Matrix]:
+        """The base's origin, and the rotation of its axes: shake along Y; pitch, then roll."""
+        shake, pitch, roll = b
+        return sp.Matrix([0, shake, 0]), sp.rot_ccw_axis3(pitch) * sp.rot_ccw_axis1(roll)
+
+    def stand(self, mount: Sequence[sp.Symbol]) -> tuple[sp.Matrix, sp.Matrix]:
+        """The arm's foot, and the rotation of its axes, in base axes."""
+        return sp.zeros(3, 1), sp.eye(3)
+
+
+class InertialOfSix(Inertial):
+    """The same with six coordinates of the base, in the model's order, and an arm that stands somewhere on it."""
+
+    names = (*Inertial.names, "x", "y", "z", "roll", "pitch", "yaw")
+    base = 6
+
+    def frame(self, b: Sequence[sp.Symbol]) -> tuple[sp.Matrix, sp.Matrix]:
+        """Yaw about Y, then pitch, then roll."""
+        heave, pitch, roll, surge, sway, yaw = b
+        return sp.Matrix([surge, heave, sway]), self.turned(roll, pitch, yaw)
+
+    def stand(self, mount: Sequence[sp.Symbol]) -> tuple[sp.Matrix, sp.Matrix]:
+        """Anywhere, and turned in the same order."""
+        return sp.Matrix(mount[:3]), self.turned(*mount[3:])
+
+    @staticmethod
+    def turned(roll: sp.Symbol, pitch: sp.Symbol, yaw: sp.Symbol) -> sp.Matrix:
+        return sp.rot_ccw_axis2(yaw) * sp.rot_ccw_axis3(pitch) * sp.rot_ccw_axis1(roll)
+
 
 @pytest.fixture(scope="session")
 def inertial() -> Inertial:
     return Inertial()
+
+
+@pytest.fixture(scope="session")
+def inertial_of_six() -> InertialOfSix:
+    return InertialOfSix()
 
 
 @pytest.fixture

@@ -56,7 +56,7 @@ def test_base_motion_is_a_sum_of_its_terms(make_model, rng):
     """Two shakes, no pitch, one roll: value, rate and acceleration in their places of w."""
     model = make_model(Structure(base_motion=SignalShape("sine", (2, 0, 1))))
     numbers = {}
-    for key, count in (("shake", 2), ("roll", 1)):
+    for key, count in (("heave", 2), ("roll", 1)):
         for k in range(count):
             for name in ("amplitude", "omega", "phase"):
                 numbers[f"base_motion.{key}.{k}.{name}"] = rng.uniform(0.1, 3)
@@ -68,7 +68,7 @@ def test_base_motion_is_a_sum_of_its_terms(make_model, rng):
         return amplitude * omega**derivative * np.sin(omega * t + phase + derivative * np.pi / 2)
 
     for derivative, found in enumerate((b, db, ddb)):
-        expected = [term("shake", 0, derivative) + term("shake", 1, derivative), 0.0, term("roll", 0, derivative)]
+        expected = [term("heave", 0, derivative) + term("heave", 1, derivative), 0.0, term("roll", 0, derivative)]
         np.testing.assert_allclose(found, expected, atol=1e-13)
 
 

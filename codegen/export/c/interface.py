@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from springline.codegen.export import Body, Export, ScalarPrinter, port_entries
 from springline.codegen.program import literal
 from springline.model.parameters import Slot
-from springline.model.quantities import A_LIMITED, BASE, REFERENCE, SATURATED, E, Quantity, U, entries
+from springline.model.quantities import A_LIMITED, REFERENCE, SATURATED, E, Quantity, U, entries
 
 _MATH_STACK = 160  # bytes below the deepest elementary function, as measured on Cortex-M7
 
@@ -69,7 +69,7 @@ class TypedInterface:
             "command": declared(U),
             "diagnostics": (*numbers, *declared(*limits, integer=True)),
             "state": declared(*system.drive.state),
-            "base": declared(*BASE),
+            "base": declared(*system.base_motion),
         }
         if remembers:
             self.structures["memory"] = declared(*system.controller_states)

@@ -17,7 +17,7 @@ from springline.model.symbolic import as_written
 
 Values = Callable[..., NDArray[np.float64]]
 SHORT = LoopSettings(steps=400, step=1e-4, output_every=50)
-VARIED = ("control.delta", "plant.m3", "base_motion.shake.0.amplitude", "initial.q.0")
+VARIED = ("control.delta", "plant.m3", "base_motion.heave.0.amplitude", "initial.q.0")
 
 
 def spread(program: Program, values_of: Values, runs: int) -> NDArray[np.float64]:
@@ -292,7 +292,7 @@ def test_signals_of_its_own_make_a_run_compute_them(shaken: Program, values_of: 
     """Only what the varied amplitude reaches is computed per run; the reference stays shared."""
     keys = [slot.key for slot in shaken.system.slots]
     baked = dict(zip(keys, values_of(shaken), strict=True))
-    del baked["base_motion.shake.0.amplitude"]
+    del baked["base_motion.heave.0.amplitude"]
     sizes = lanes.emit(shaken, baked, 1).sizes
     assert sizes["uniform"] > 5
     assert 0 < sizes["varying"] < 8

@@ -17,8 +17,8 @@ pytestmark = pytest.mark.usefixtures("other_arms")
 OMEGA, AMPLITUDE, DURATION = 7.0, 0.3, 1.0
 QUICK = ("-O0",)  # optimisation changes no bit: test_engines.py compares its levels
 VALUES = {
-    "base_motion.shake.0.amplitude": AMPLITUDE,
-    "base_motion.shake.0.omega": OMEGA,
+    "base_motion.heave.0.amplitude": AMPLITUDE,
+    "base_motion.heave.0.omega": OMEGA,
     "initial.q.0": 0.4,
     "initial.dq.0": -0.2,
     "control.a_max.0": 5.0,

@@ -1,7 +1,7 @@
 """The model against Pinocchio and MuJoCo, which share no line of code with it (extra: verify).
 
-The base is a chain of massless links there, one for each of its coordinates: heave along y, then pitch about z, then
-roll about x. What the arm's joints need, with that chain led through the base's motion, is what our equations say.
+The base is a chain of massless links there, one for each of its six coordinates: along x, y and z, then about y, z and
+x. What the arm's joints need, with that chain led through the base's motion, is what our equations say.
 """
 
 import casadi as ca
@@ -9,13 +9,22 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from springline.model.base import COORDINATES
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import ParameterVector
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 
-BASE = ("shake", "pitch", "roll")  # as w has them
-CHAIN = (("shake", "p", (0, 1, 0)), ("pitch", "r", (0, 0, 1)), ("roll", "r", (1, 0, 0)))
+BASE = tuple(item.key for item in COORDINATES)  # as w has them
+CHAIN = (
+    ("surge", "p", (1, 0, 0)),
+    ("heave", "p", (0, 1, 0)),
+    ("sway", "p", (0, 0, 1)),
+    ("yaw", "r", (0, 1, 0)),
+    ("pitch", "r", (0, 0, 1)),
+    ("roll", "r", (1, 0, 0)),
+)
+SIX = SignalShape("sine", (1,) * len(BASE))
 """Joints of the base from the inertial frame on: coordinate, kind, axis."""
 
 
@@ -131,14 +140,14 @@ def arm(request, monkeypatch, make_chain, make_numbers):
     """A structure, numbers of its mechanism, and its links as numbers."""
     if request.param == "paper":
         numbers = {"m2": 10.0, "m3": 40.0, "J": 7.3, "L1": 0.5, "L3": 0.74}
-        return Structure(), numbers, AsSlide.links(**numbers), 9.8
+        return Structure(base_motion=SIX), numbers, AsSlide.links(**numbers), 9.8
     name, size = CHAINS[request.param]
     numbers = {}
     if name == "chain":
         monkeypatch.setitem(MECHANISMS, "chain", make_chain("rrprrpr"))
         numbers = make_numbers(7, np.random.default_rng(11))
     mechanism = MECHANISMS[name].of_size(size)
-    structure = Structure(mechanism=name, size=size, reference=SignalShape("sine", (0,) * len(mechanism.joints)))
+    structure = Structure(mechanism=name, size=size, reference=SignalShape("sine", (0,) * len(mechanism.joints)), base_motion=SIX)
     return structure, numbers, links_of(mechanism, numbers), 9.81
 
 
@@ -206,7 +215,7 @@ def test_an_open_loop_of_the_elastic_plant(pin, arm):
                   if key == f"plant.{name}" or key.startswith(f"plant.{name}.")])
         for what in ("motor_inertia", "stiffness")
     )  # fmt: skip
-    amplitude, omega = np.array([0.3, 0.1, 0.15]), np.array([1.1, 0.9, 0.7])
+    amplitude, omega = 0.3 / np.arange(1, 7), np.linspace(0.7, 1.2, 6)
 
     def base(t):
         return (

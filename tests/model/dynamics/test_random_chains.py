@@ -23,8 +23,8 @@ def system_of(make_chain, make_numbers):
         rng = np.random.default_rng(seed)
         with pytest.MonkeyPatch.context() as patched:
             patched.setitem(MECHANISMS, "chain", make_chain(kinds, frames))
-            shape = SignalShape("sine", (0,) * len(kinds))
-            system = System(Structure(mechanism="chain", reference=shape, drive=drive))
+            shape, moving = SignalShape("sine", (0,) * len(kinds)), SignalShape("sine", (1,) * 6)
+            system = System(Structure(mechanism="chain", reference=shape, base_motion=moving, drive=drive))
             assert system.functions
         numbers = make_numbers(len(kinds), rng)
         p = np.array([numbers.get(slot.key.split(".", 1)[1], slot.default) for slot in system.slots])
@@ -71,7 +71,8 @@ def test_what_a_moving_base_does(system_of, kinds, frames, seed):
     b = b0 + db0 * t + ddb0 * t**2 / 2
     base = system.base
     turned = ca.substitute(base.rotation, base.b, b)
-    moved = ca.substitute(base.position, base.b, b)
+    along = {item.key: b[i] for i, item in enumerate(base.coordinates)}
+    moved = ca.vertcat(along["surge"], along["heave"], along["sway"])
     kinetic, potential, arm = ca.SX(0), ca.SX(0), system._plant
     for body in system.mechanism.checked_bodies(q, arm):
         place = moved + turned @ body.position

@@ -117,8 +117,8 @@ def test_a_run_of_table_2_is_the_nominal_one_but_for_what_the_table_says(name: s
     scenario = load_scenario(name)
     moving = scenario.document["base_motion"]
     assert moving["kind"] == "sine"
-    only = name.rpartition("_")[2] if "group1" in name else "shake"
-    assert [key for key in ("shake", "pitch", "roll") if moving[key]] == [only]
+    only = name.rpartition("_")[2].replace("shake", "heave") if "group1" in name else "heave"
+    assert [key for key in ("surge", "sway", "heave", "roll", "pitch", "yaw") if moving[key]] == [only]
     own = GROUPS[name]
     rest = scenario.with_overrides({"base_motion.kind": "none", "control.law": "variable_power_log"})
     values, nominal = slots(rest), slots(load_scenario("paper/nominal"))
@@ -141,16 +141,16 @@ def test_as_printed_has_no_boundary_layer_and_no_limit() -> None:
     assert load_scenario("paper/as_printed").structure() == Structure()
 
 
-def test_the_vessel_record_moves_all_three_coordinates_for_a_minute() -> None:
+def test_the_vessel_record_moves_all_six_coordinates_for_a_minute() -> None:
     scenario = load_scenario("ship/vessel_10hz")
-    assert scenario.structure().base_motion == SignalShape("table", (1, 1, 1))
+    assert scenario.structure().base_motion == SignalShape("table", (1,) * 6)
     (table,) = scenario.tables()
     (layout,) = scenario.system().tables
-    assert layout.channels == (0, 1, 2) and table.coefficients.shape[1] == 3
+    assert layout.channels == (0, 1, 2, 3, 4, 5) and table.coefficients.shape[1] == 6
     assert scenario.steps * scenario.step == 60.0
     assert (table.dt / scenario.step).is_integer()  # every knot is a step
     # Facts of the record: standard deviations of heave (m), pitch and roll (deg).
-    spread = table.coefficients[:, :, 0].std(axis=0) * [1, 180 / math.pi, 180 / math.pi]
+    spread = table.coefficients[:, :3, 0].std(axis=0) * [1, 180 / math.pi, 180 / math.pi]
     assert spread == pytest.approx([0.682, 0.53, 1.22], abs=0.005)
     assert scenario.with_overrides({"simulation.duration": 359.0}).steps == 359 * 8192
 
@@ -320,8 +320,8 @@ def test_tables_are_found_beside_the_scenario(load, tmp_path: Path) -> None:
             id="term without omega",
         ),
         pytest.param(
-            '[base_motion]\nkind = "sine"\nheave = []',
-            ["base_motion.heave", "unknown key", "shake, pitch, roll"],
+            '[base_motion]\nkind = "sine"\nheel = []',
+            ["base_motion.heel", "unknown key", "heave, pitch, roll, surge, sway, yaw"],
             id="unknown oscillation",
         ),
         pytest.param(
@@ -399,7 +399,7 @@ def test_mistakes_about_tables_are_told(
 
 def test_a_table_needs_a_coordinate(told) -> None:
     message = told('[base_motion]\nkind = "table"\npath = "x.csv"\ncolumns = { t = "t" }')
-    assert "base_motion.columns" in message and "at least one of shake, pitch, roll" in message
+    assert "base_motion.columns" in message and "at least one of heave, pitch, roll, surge, sway, yaw" in message
 
 
 # Where the run lies in the record
@@ -471,7 +471,7 @@ def test_a_note_tells_of_a_motion_that_goes_astray_before_it_rests(
         (table,) = kernel_tables(scenario.tables())
         knots = table.t0 + table.dt * np.arange(len(table.coefficients))
         seen = table.coefficients[(knots >= 0.0) & (knots <= 40.0), 0, 0]
-        told = float(note.rpartition("goes as far as shake ")[2].split()[0])
+        told = float(note.rpartition("goes as far as heave ")[2].split()[0])
         assert told == pytest.approx(seen[np.abs(seen - 5.0).argmax()], rel=1e-3)
 
 
@@ -651,7 +651,7 @@ def test_overrides_reach_every_place(load) -> None:
     values = slots(scenario)
     expected = {
         "control.delta": 0.02, "control.mu.0": 4, "control.mu.1": 3, "plant.m3": 48, "plant.J": 9,
-        "reference.lift.terms.0.amplitude": 0.5, "base_motion.shake.0.omega": 3, "initial.q.1": 0.2,
+        "reference.lift.terms.0.amplitude": 0.5, "base_motion.heave.0.omega": 3, "initial.q.1": 0.2,
         "control.U_max.0": 5, "control.U_max.1": math.inf,
     }  # fmt: skip
     assert {key: values[key] for key in expected} == expected
@@ -715,6 +715,7 @@ def test_numeric_keys_are_the_slots_and_their_shorthands() -> None:
     assert set(slot_keys) < set(keys)
     assert set(keys) - set(slot_keys) == {
         *(f"{key}.scale" for key in slot_keys if key.startswith("plant.")),
+        *(f"base_motion.shake.{i}.{name}" for i in (0, 1) for name in ("amplitude", "omega", "phase")),
         "control.mu", "control.K_f", "control.a_max", "control.U_max", "initial.q", "initial.dq",
     }  # fmt: skip
     assert keys["control.K_f"].unit == "N s/m or N m s/rad" and keys["control.delta"].unit == "m or rad"

@@ -16,7 +16,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 from typer.testing import CliRunner, Result
 
 from springline.runner.cli import app
-from springline.runner.files.errors import InputError
+from springline.runner.files import InputError
 from springline.runner.scenario import load_scenario
 from springline.runner.scenario.signal_csv import HALF_TURN, UNITS, Column
 from springline.runner.scenario.signal_tables import TableRead, excess_notes, read_table

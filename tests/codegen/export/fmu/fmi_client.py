@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from springline.codegen.export.fmu import Settings, fmu
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.codegen.program import Program, SignalTable
-from springline.model.base import COORDINATES
+from springline.model.base import PAPER_COORDINATES
 
 STEP, PERIOD, DURATION = 1e-4, 1e-3, 0.3
 SAMPLED = Settings(duration=DURATION, step=STEP, period=PERIOD)
@@ -112,7 +112,7 @@ def columns(of: Program) -> list[str]:
     """Names of a trajectory's columns after t, in the order of loop.c."""
     joints = [joint.name for joint in of.system.joints]
     quantities = ("q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U")
-    return [*(f"{q}_{joint}" for q in quantities for joint in joints), *(c.symbol for c in COORDINATES)]
+    return [*(f"{q}_{joint}" for q in quantities for joint in joints), *(c.symbol for c in PAPER_COORDINATES)]
 
 
 def own_run(
