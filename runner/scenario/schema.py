@@ -385,6 +385,8 @@ def _size(mechanism: Mechanism) -> dict[str, Any]:
     if not mechanism.sizes:
         return {}
     return {SIZE: (Annotated[int, one_of(mechanism.sizes, "number of joints")], len(mechanism.joints))}
+
+
 def _base_motion_sections(motion: str, joints: Sequence[Joint]) -> dict[str, type[Section]]:
     """[base_motion] by kind; an arm stands somewhere on a base that is at rest, too."""
     mount: dict[str, Any] = {

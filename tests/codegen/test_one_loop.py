@@ -24,7 +24,7 @@ from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, k
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS
 from springline.model.quantities import Q1, Quantity
-from springline.model.structure import Structure
+from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 
 pytestmark = pytest.mark.usefixtures("other_arms")

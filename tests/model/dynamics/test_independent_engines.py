@@ -147,7 +147,9 @@ def arm(request, monkeypatch, make_chain, make_numbers):
         monkeypatch.setitem(MECHANISMS, "chain", make_chain("rrprrpr"))
         numbers = make_numbers(7, np.random.default_rng(11))
     mechanism = MECHANISMS[name].of_size(size)
-    structure = Structure(mechanism=name, size=size, reference=SignalShape("sine", (0,) * len(mechanism.joints)), base_motion=SIX)
+    structure = Structure(
+        mechanism=name, size=size, reference=SignalShape("sine", (0,) * len(mechanism.joints)), base_motion=SIX
+    )
     return structure, numbers, links_of(mechanism, numbers), 9.81
 
 
