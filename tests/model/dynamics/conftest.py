@@ -19,6 +19,7 @@ class Imu:
     omega: ca.SX
     alpha: ca.SX
     force: ca.SX
+    constants = ca.SX(0, 1)
 
     def rest_force(self, g):
         return ca.vertcat(0, g, 0)
