@@ -16,8 +16,8 @@ from typing import Any, cast
 import casadi as ca
 
 from springline.codegen.export.bound import Export, port_entries
-from springline.codegen.export.names import KEYWORDS
 from springline.codegen.program import (
+    KEYWORDS,
     MASKS,
     POWERS,
     SPECIAL_POWERS,
