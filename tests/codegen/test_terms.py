@@ -1,16 +1,20 @@
 """Exported C reads as the law does: sections, the model's names, parameters by theirs; nothing else is computed."""
 
+import itertools
 import re
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import pytest
 
 from springline.codegen.export import bind
+from springline.codegen.export.c.model import model_files
 from springline.codegen.export.c.tree import generate_files
 from springline.codegen.kernel import toolchain
 from springline.model import Law, Parameter, Structure, System
@@ -86,6 +90,29 @@ def test_what_comes_from_several_says_how_to_the_last_bit() -> None:
     for _, value, formula in found:
         python = re.sub(r"(?<=[\w)]) (?=[\w(])", " * ", formula).replace("^", "**")
         assert eval(python, {}, values) == value, formula  # noqa: S307 - our own text
+
+
+@pytest.mark.parametrize("tunable", [(), "all"])
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("prefix", ["springline", "manipulator_on_a_ship_number_7"])
+def test_no_line_of_the_models_functions_is_too_long(prefix: str, real: Any, tunable: Any) -> None:
+    """And what follows a comment's first line stands below its first word."""
+    loaded = load_scenario("paper/nominal", {"control.mu": 12.25})
+    export = bind(loaded.structure(), loaded.values(), prefix=prefix, real=real, tunable=tunable)
+    for path, content in model_files(export).items():
+        lines = content.decode().splitlines()
+        assert [line for line in lines if len(line) > 100] == [], path
+        for first, second in itertools.pairwise(lines):
+            if re.match(r"  const \w+ \w+ = .*; +/\*(?!.*\*/)", first):
+                assert second.index(second.split()[0]) == first.index("/*") + 3, second
+
+
+def test_no_line_of_the_mathematics_is_too_long() -> None:
+    folder = resources.files("springline.codegen") / "runtime"
+    headers = [path for path in folder.iterdir() if path.name.startswith("sl_")]
+    assert len(headers) >= 5
+    for path in headers:
+        assert [line for line in path.read_text().splitlines() if len(line) > 100] == [], path.name
 
 
 @pytest.mark.parametrize("drive", ["elastic", "rigid"])
