@@ -316,8 +316,8 @@ class ScalarPrinter:
             if node.binding is Binding.CONSTANT:
                 if i not in self._graph.constants:
                     return literal(node.value, self._real)
-                unnamed = sum(not self._graph.constants[k][0] for k in constants)
-                return constants.setdefault(i, self._graph.constants[i][0] or f"c{unnamed}")
+                unnamed = sum(_OWN.fullmatch(name) is not None for name in constants.values())
+                return constants.setdefault(i, self._graph.constants[i][0] or names.get(i) or f"c{unnamed}")
             if i not in ready:
                 ready.add(i)
                 if given(i) != names[i]:
@@ -376,15 +376,20 @@ class ScalarPrinter:
     def _named(
         self, wanted: Sequence[int], needed: Sequence[int], labels: Sequence[str], sections: Sequence[Section]
     ) -> dict[int, str]:
-        """What each value is called: by the model where it has a word for it, else a0, a1, … in order."""
+        """What each value is called: by the model where it has a word for it, else a0, a1, … in order.
+
+        So is a constant that comes from several parameters; the others have names of their own.
+        """
         nodes = self._graph.nodes
-        names = dict(self._names) | {i: f"r{k}" for i, k in self._derived.items()}
+        names = dict(self._names)
         for i, label in zip(wanted, labels, strict=True):
             names.setdefault(i, label)
         taken = {*names.values(), *(name for name, _ in self._graph.constants.values() if name)}
         for i, label in (pair for section in sections for pair in section.names):
             if label not in taken and not _is_taken(label) and names.setdefault(i, label) == label:
                 taken.add(label)
+        for i, k in self._derived.items():
+            names.setdefault(i, f"r{k}")
         for position, i in enumerate(needed):
             if nodes[i].op in (ca.OP_SIN, ca.OP_COS) and nodes[i].arguments[0] in self._names:
                 function = "sin" if nodes[i].op == ca.OP_SIN else "cos"
