@@ -338,7 +338,7 @@ class ScalarPrinter:
             if node.op in (ca.OP_SIN, ca.OP_COS) and len({(op, a) for op, a in pairs if a == node.arguments[0]}) == 2:
                 sine, cosine = pairs[ca.OP_SIN, node.arguments[0]], pairs[ca.OP_COS, node.arguments[0]]
                 argument = value(node.arguments[0])
-                lines.append(f"{self._real} {names[sine]}, {names[cosine]};")
+                lines += [f"{self._real} {names[k]};" for k in (sine, cosine)]
                 lines.append(f"{self._math}_sincos({argument}, &{names[sine]}, &{names[cosine]});")
                 ready |= {sine, cosine}
                 continue
