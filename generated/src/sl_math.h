@@ -449,7 +449,8 @@ SL_RARE uint64_t sl_reduce_rare(double x, double *hi, double *lo) {
   int e = (int)((b & SL_EXPONENT) >> 52), first = e - 1013, i, shift;
   double unit;
   if (e == 2047) {
-    *hi = *lo = SL_NAN;
+    *hi = SL_NAN;
+    *lo = SL_NAN;
     return 0;
   }
   for (i = 0; i < 3; i++) { /* the bits before `first` weigh whole turns */

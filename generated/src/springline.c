@@ -175,7 +175,8 @@ static int springline_evaluate_control(
   const double ddq1d_lift = reference->ddq1d_lift;
   const double ddq_lift = ddq1d_lift - u_e_lift;
   const double a94 = H_lift_lift * ddq_lift;
-  double sin_q1_rotation, cos_q1_rotation;
+  double sin_q1_rotation;
+  double cos_q1_rotation;
   sl_sincos(q1_rotation, &sin_q1_rotation, &cos_q1_rotation);
   const double H_rotation_lift = c3 * cos_q1_rotation;
   const double u_e_rotation = a_rotation - dsurface_rotation;
@@ -263,7 +264,8 @@ static void springline_evaluate_plant(
   const double ddq2_rotation = a6 * c1;
 
   /* mass matrix of the arm, (1) */
-  double sin_q1_rotation, cos_q1_rotation;
+  double sin_q1_rotation;
+  double cos_q1_rotation;
   sl_sincos(q1_rotation, &sin_q1_rotation, &cos_q1_rotation);
   const double M1_rotation_lift = c2 * cos_q1_rotation;
 
@@ -272,7 +274,8 @@ static void springline_evaluate_plant(
   const double a10 = dq1_rotation * dq1_rotation;
   const double a12 = a10 * sin_q1_rotation;
   const double theta_1x = base->theta_1x;
-  double sin_theta_1x, cos_theta_1x;
+  double sin_theta_1x;
+  double cos_theta_1x;
   sl_sincos(theta_1x, &sin_theta_1x, &cos_theta_1x);
   const double dd_theta_1z = base->dd_theta_1z;
   const double a14 = cos_theta_1x * dd_theta_1z;
@@ -283,7 +286,8 @@ static void springline_evaluate_plant(
   const double a18 = a14 - a17;
   const double a19 = c3 * a18;
   const double theta_1z = base->theta_1z;
-  double sin_theta_1z, cos_theta_1z;
+  double sin_theta_1z;
+  double cos_theta_1z;
   sl_sincos(theta_1z, &sin_theta_1z, &cos_theta_1z);
   const double a21 = cos_theta_1z * cos_theta_1x;
   const double dd_y_r1 = base->dd_y_r1;
@@ -551,8 +555,8 @@ int springline_plant_step(
     const double gain_0 = 0.16666666666666666 * step;
     const double gain_1 = 0.5 * step;
     for (i = 0; i < 8; i++) {
-      next[i] = x[i] + gain_0 * slope[i];
-      at[i] = x[i] + gain_1 * slope[i];
+      next[i] = x[i] + (gain_0 * slope[i]);
+      at[i] = x[i] + (gain_1 * slope[i]);
     }
   }
   /* stage 2 of 4 */
@@ -561,8 +565,8 @@ int springline_plant_step(
     const double gain_0 = 0.3333333333333333 * step;
     const double gain_1 = 0.5 * step;
     for (i = 0; i < 8; i++) {
-      next[i] = next[i] + gain_0 * slope[i];
-      at[i] = x[i] + gain_1 * slope[i];
+      next[i] = next[i] + (gain_0 * slope[i]);
+      at[i] = x[i] + (gain_1 * slope[i]);
     }
   }
   /* stage 3 of 4 */
@@ -571,8 +575,8 @@ int springline_plant_step(
     const double gain_0 = 0.3333333333333333 * step;
     const double gain_1 = 1.0 * step;
     for (i = 0; i < 8; i++) {
-      next[i] = next[i] + gain_0 * slope[i];
-      at[i] = x[i] + gain_1 * slope[i];
+      next[i] = next[i] + (gain_0 * slope[i]);
+      at[i] = x[i] + (gain_1 * slope[i]);
     }
   }
   /* stage 4 of 4 */
@@ -580,7 +584,7 @@ int springline_plant_step(
   {
     const double gain_0 = 0.16666666666666666 * step;
     for (i = 0; i < 8; i++) {
-      next[i] = next[i] + gain_0 * slope[i];
+      next[i] = next[i] + (gain_0 * slope[i]);
     }
   }
   if (!springline_state_is_finite(next)) return SPRINGLINE_DIVERGED;
@@ -648,13 +652,15 @@ int springline_signals(
     const double c3 = 2.4674011002723395;                         /* reference_rotation_0_omega^2 */
     const double a0 = reference_lift_0_omega * t;
     const double a1 = a0 + reference_lift_0_phase;
-    double a2, a10;
+    double a2;
+    double a10;
     sl_sincos(a1, &a2, &a10);
     const double a3 = reference_lift_0_amplitude * a2;
     const double q1d_lift = reference_lift_offset + a3;
     const double a5 = reference_rotation_0_omega * t;
     const double a6 = a5 + reference_rotation_0_phase;
-    double a7, a12;
+    double a7;
+    double a12;
     sl_sincos(a6, &a7, &a12);
     const double a8 = reference_rotation_0_amplitude * a7;
     const double q1d_rotation = reference_rotation_offset + a8;
