@@ -150,12 +150,14 @@ class Body:
     values      C of the outputs' entries, where `lines` have run
     operations  arithmetic operations and calls of elementary functions
     live        most values that are alive at once
+    constants   names of the constants that `lines` begin with; a parameter's is its symbol
     """
 
     lines: tuple[str, ...]
     values: tuple[str, ...]
     operations: int
     live: int
+    constants: frozenset[str]
 
 
 class ScalarPrinter:
@@ -351,7 +353,8 @@ class ScalarPrinter:
         lines += [""] if sections else []
         lines += [f"{target} = {text};" for target, text in zip(targets, values[: len(targets)], strict=True)]
         lines = [*self._constant_lines(constants), *lines]
-        return Body(tuple(lines), tuple(values), len(needed), self._live(wanted, needed))
+        live = self._live(wanted, needed)
+        return Body(tuple(lines), tuple(values), len(needed), live, frozenset(constants.values()))
 
     def _constant_lines(self, used: Mapping[int, str]) -> list[str]:
         """Definitions of the constants that come from parameters, each with what it is; parameters first."""

@@ -14,6 +14,7 @@ import casadi as ca
 import pytest
 
 from springline.codegen.export import bind
+from springline.codegen.export.c.interface import TypedInterface
 from springline.codegen.export.c.model import model_files
 from springline.codegen.export.c.tree import generate_files
 from springline.codegen.kernel import toolchain
@@ -83,6 +84,13 @@ def test_baked_parameters_are_called_by_their_names_and_have_their_values() -> N
     assert {"control_k1", "control_lambda", "control_a_max_rotation", "plant_k_s2"} <= {name for name, _, _ in found}
     for name, value, _ in found:
         assert value == values[name]
+
+
+def test_a_body_tells_the_names_of_its_constants() -> None:
+    loaded = load_scenario("paper/nominal")
+    body = TypedInterface(bind(loaded.structure(), loaded.values())).bodies["control"]
+    assert {"control_a_max_lift", "control_a_max_rotation", "H_lift_lift", "c0"} <= body.constants
+    assert body.constants == {line.split()[2] for line in body.lines if re.match(r"const \w+ \w+ = .*/\*", line)}
 
 
 def test_what_comes_from_several_says_how_to_the_last_bit() -> None:
