@@ -78,11 +78,15 @@ class Elastic:
     def plant(self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values) -> ca.SX:
         """dx/dt (4n x 1), equation (1)."""
         q1, dq1, q2, dq2 = ca.vertsplit(x, x.numel() // 4)
-        with section("springs and motors", "(1)"):
+        with section("springs", "(1)"):
             z = named("z", spring_force(q1, q2, diagonal(mechanism.stiffness, p)))
+        with section("motors", "(1)"):
             motors = named("ddq2", over(u - z, diagonal(mechanism.motor_inertia, p)))
-        with section("arm on its moving base", "(1)"):
-            named("M1", link.mass), named("C_dq1_G_S", link.bias)
+        with section("mass matrix of the arm", "(1)"):
+            named("M1", link.mass)
+        with section("Coriolis, centrifugal and gravity forces less what the moving base adds", "(1)"):
+            named("C_dq1_G_S", link.bias)
+        with section("accelerations of the joints", "(1)"):
             joints = named("ddq1", solve_spd(link.mass, z - link.bias))
         return ca.vertcat(dq1, joints, dq2, motors)
 
@@ -106,9 +110,12 @@ class Rigid:
     def plant(self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values) -> ca.SX:
         """dx/dt (2n x 1): equation (4) with U in place of its slow part."""
         _, dq1 = ca.vertsplit(x, x.numel() // 2)
-        with section("arm on its moving base, motors on its joints", "(4)"):
+        with section("mass matrix of the arm, motors on its joints", "(4)"):
             mass = named("H", slow_mass(link.mass, diagonal(mechanism.motor_inertia, p)))
-            joints = named("ddq1", solve_spd(mass, u - named("C_dq1_G_S", link.bias)))
+        with section("Coriolis, centrifugal and gravity forces less what the moving base adds", "(4)"):
+            named("C_dq1_G_S", link.bias)
+        with section("accelerations of the joints", "(4)"):
+            joints = named("ddq1", solve_spd(mass, u - link.bias))
         return ca.vertcat(dq1, joints)
 
     def energy(self, x: ca.SX, mechanism: Mechanism, p: Values) -> ca.SX:

@@ -16,8 +16,8 @@ from typing import Any, cast
 import casadi as ca
 
 from springline.codegen.export.bound import Export, port_entries
-from springline.codegen.export.names import KEYWORDS
 from springline.codegen.program import (
+    KEYWORDS,
     MASKS,
     POWERS,
     SPECIAL_POWERS,
@@ -150,12 +150,14 @@ class Body:
     values      C of the outputs' entries, where `lines` have run
     operations  arithmetic operations and calls of elementary functions
     live        most values that are alive at once
+    constants   names of the constants that `lines` begin with; a parameter's is its symbol
     """
 
     lines: tuple[str, ...]
     values: tuple[str, ...]
     operations: int
     live: int
+    constants: frozenset[str]
 
 
 class ScalarPrinter:
@@ -316,8 +318,8 @@ class ScalarPrinter:
             if node.binding is Binding.CONSTANT:
                 if i not in self._graph.constants:
                     return literal(node.value, self._real)
-                unnamed = sum(not self._graph.constants[k][0] for k in constants)
-                return constants.setdefault(i, self._graph.constants[i][0] or f"c{unnamed}")
+                unnamed = sum(_OWN.fullmatch(name) is not None for name in constants.values())
+                return constants.setdefault(i, self._graph.constants[i][0] or names.get(i) or f"c{unnamed}")
             if i not in ready:
                 ready.add(i)
                 if given(i) != names[i]:
@@ -338,7 +340,7 @@ class ScalarPrinter:
             if node.op in (ca.OP_SIN, ca.OP_COS) and len({(op, a) for op, a in pairs if a == node.arguments[0]}) == 2:
                 sine, cosine = pairs[ca.OP_SIN, node.arguments[0]], pairs[ca.OP_COS, node.arguments[0]]
                 argument = value(node.arguments[0])
-                lines.append(f"{self._real} {names[sine]}, {names[cosine]};")
+                lines += [f"{self._real} {names[k]};" for k in (sine, cosine)]
                 lines.append(f"{self._math}_sincos({argument}, &{names[sine]}, &{names[cosine]});")
                 ready |= {sine, cosine}
                 continue
@@ -351,7 +353,8 @@ class ScalarPrinter:
         lines += [""] if sections else []
         lines += [f"{target} = {text};" for target, text in zip(targets, values[: len(targets)], strict=True)]
         lines = [*self._constant_lines(constants), *lines]
-        return Body(tuple(lines), tuple(values), len(needed), self._live(wanted, needed))
+        live = self._live(wanted, needed)
+        return Body(tuple(lines), tuple(values), len(needed), live, frozenset(constants.values()))
 
     def _constant_lines(self, used: Mapping[int, str]) -> list[str]:
         """Definitions of the constants that come from parameters, each with what it is; parameters first."""
@@ -376,15 +379,20 @@ class ScalarPrinter:
     def _named(
         self, wanted: Sequence[int], needed: Sequence[int], labels: Sequence[str], sections: Sequence[Section]
     ) -> dict[int, str]:
-        """What each value is called: by the model where it has a word for it, else a0, a1, … in order."""
+        """What each value is called: by the model where it has a word for it, else a0, a1, … in order.
+
+        So is a constant that comes from several parameters; the others have names of their own.
+        """
         nodes = self._graph.nodes
-        names = dict(self._names) | {i: f"r{k}" for i, k in self._derived.items()}
+        names = dict(self._names)
         for i, label in zip(wanted, labels, strict=True):
             names.setdefault(i, label)
         taken = {*names.values(), *(name for name, _ in self._graph.constants.values() if name)}
         for i, label in (pair for section in sections for pair in section.names):
             if label not in taken and not _is_taken(label) and names.setdefault(i, label) == label:
                 taken.add(label)
+        for i, k in self._derived.items():
+            names.setdefault(i, f"r{k}")
         for position, i in enumerate(needed):
             if nodes[i].op in (ca.OP_SIN, ca.OP_COS) and nodes[i].arguments[0] in self._names:
                 function = "sin" if nodes[i].op == ca.OP_SIN else "cos"

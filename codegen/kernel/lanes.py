@@ -17,6 +17,7 @@ import casadi as ca
 
 from springline.codegen.kernel.schedule import longest_chain_first
 from springline.codegen.program import (
+    KEYWORDS,
     MASKS,
     POWERS,
     SPECIAL_POWERS,
@@ -37,6 +38,13 @@ _FAST = frozenset({
 
 
 _FORMULA_DEPTH = 4
+
+# What the printed functions call their own: numbered values, sines and cosines, masks, arguments, their mathematics.
+_OWN = re.compile(r"[adrsv]\d+|(begin|first)\d+|sin_\w+|cos_\w+|(sl|slv|kernel)_\w+|ok(_\d+)?")
+_GIVEN = frozenset({
+    *("now", "x", "p", "r", "u", "g", "t", "b", "dx", "q1d", "e", "sigma", "wished", "a_law", "ahead", "period"),
+    *("time", "times", "data", "uniform", "varying"),
+})  # fmt: skip
 
 Load = Callable[[int, str], str]
 Store = Callable[[int, str, str], str]
@@ -126,7 +134,22 @@ class _Emitter:
         name(outputs["signals"][0], signal + [f"{d}{c}" for d in ("", "d_", "dd_") for c in base])
         for part, label in zip(outputs["control"], ("command", "e", "sigma", "wished", "a_law"), strict=True):
             name(part, [f"{label}_{j}" for j in joints])
+        self._name_parts(names)
         return names
+
+    def _name_parts(self, names: dict[int, str]) -> None:
+        """Add what the model calls the parts of its formulas, as far as nothing else is called so."""
+        labels, taken = self.graph.labels, set(names.values())
+        for i, label in (*labels["control"], *labels["plant"]):
+            own = label in _GIVEN or label in KEYWORDS or _OWN.fullmatch(label) is not None
+            if own or label in taken or self.graph.nodes[i].binding is Binding.CONSTANT:
+                continue
+            if names.setdefault(i, label) == label:
+                taken.add(label)
+        # The same of another command: a function has the one or the other.
+        for (i, label), (k, _) in zip(labels["plant"], labels["closed"], strict=True):
+            if names.get(i) == label and self.graph.nodes[k].binding is not Binding.CONSTANT:
+                names.setdefault(k, label)
 
     def _keep(self, wanted: Sequence[int], binding: Binding) -> None:
         """Note which values of earlier binding times a function that computes `wanted` has to be given."""

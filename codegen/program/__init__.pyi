@@ -7,6 +7,7 @@ from .graph import Binding as Binding
 from .graph import LoopGraph as LoopGraph
 from .graph import Node as Node
 from .graph import ValueGraph as ValueGraph
+from .keywords import KEYWORDS as KEYWORDS
 from .literals import Real as Real
 from .literals import constant_expression as constant_expression
 from .literals import literal as literal

@@ -16,6 +16,7 @@ from enum import IntEnum
 import casadi as ca
 
 from springline.codegen.program.frozen import Program
+from springline.model.system import System
 
 
 class Binding(IntEnum):
@@ -163,6 +164,7 @@ class LoopGraph(ValueGraph):
 
     baked    slot key -> value for the parameters that are constants; all others are tunable
     tunable  their keys, in the order of their leaves ("p", k)
+    labels   of a Function, the nodes that the model has a word for, with that word
     """
 
     def __init__(self, program: Program, baked: Mapping[str, float]) -> None:
@@ -195,6 +197,30 @@ class LoopGraph(ValueGraph):
         if z:
             self.add("rates", functions["rates"], [w, s, x, *z, p, r])
             self.add("update", functions["update"], [w, s, x, *z, [self.leaf("h", 0, Binding.STATE)], p, r])
+        n, system = program.system.n, program.system
+        [seen] = self.add("measure", system.function("measure"), [x, p])
+        reference, base = [w[k * n : (k + 1) * n] for k in range(3)], w[3 * n :]
+        third = len(base) // 3
+        motion = [base[k * third : (k + 1) * third] for k in range(3)]
+        self.labels = {
+            "control": self._labelled(system, "control", [*reference, seen, *z, p]),
+            "plant": self._labelled(system, "plant", [*motion, x, u, p]),
+            "closed": self._labelled(system, "plant", [*motion, x, command, p]),
+        }
+
+    def _labelled(self, system: System, name: str, inputs: Sequence[Sequence[int]]) -> list[tuple[int, str]]:
+        """What the model names in Function `name` of these inputs.
+
+        The Function of the names is not staged: its values are the nodes of those that are, for the operations are the
+        same. What only it computes is needed by nothing, and so it is not printed.
+        """
+        terms = system.terms(name)
+        if not terms:
+            return []
+        joints = tuple(joint.name for joint in system.joints)
+        values = self.add(f"{name}_terms", system.function(f"{name}_terms"), inputs)
+        labels = [label for term in terms for label in term.labels(joints)]
+        return list(zip((i for part in values for i in part), labels, strict=True))
 
     def value_at(self, i: int, parameters: Sequence[float]) -> float | None:
         """Value of a run-time node at given slots' values where exact operations lead there, else None."""

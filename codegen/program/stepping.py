@@ -66,9 +66,9 @@ def statements(
     update = updates(tableau)[stage]
     if update.next:
         before = "x" if stage == first_in_sum(tableau) else "next"
-        yield f"{element('next')} = {element(before)} + {gain(update.next)} * {slope(stage)};"
+        yield f"{element('next')} = {element(before)} + ({gain(update.next)} * {slope(stage)});"
     if update.at:
-        terms = " + ".join(f"{gain(factor)} * {slope(k)}" for factor, k in update.at)
+        terms = " + ".join(f"({gain(factor)} * {slope(k)})" for factor, k in update.at)
         yield f"{element('at')} = {element('x')} + {terms};"
 
 

@@ -1,8 +1,9 @@
 /*
- * sl_casadi.h - gives the C that CasADi prints springline's elementary functions in place of the host's.
+ * sl_casadi.h - gives the C that CasADi prints springline's elementary functions in place of the
+ * host's.
  *
- * CasADi's files call sin, pow, fmin, ... by their C99 names. With SL_HOST_LIBM defined they are the host's, and results
- * then differ in the last bits from machine to machine.
+ * CasADi's files call sin, pow, fmin, ... by their C99 names. With SL_HOST_LIBM defined they are
+ * the host's, and results then differ in the last bits from machine to machine.
  */
 #ifndef SL_CASADI_H
 #define SL_CASADI_H

@@ -1,10 +1,10 @@
 /*
  * sl_lanes.h - sl_math.h on SL_W doubles at once, lane by lane the same bits.
  *
- * sl_v is a vector of SL_W doubles (GCC/Clang vector extension; SL_W = 1 is plain double), sl_b its bits, sl_m a
- * mask as comparisons make it.  Arithmetic and comparisons are written with operators; slv_name() are the
- * functions of sl_math.h, from the same source.  Intrinsics appear only where the extensions lose speed
- * (blend, root, minimum, "any lane"), and never change a bit.
+ * sl_v is a vector of SL_W doubles (GCC/Clang vector extension; SL_W = 1 is plain double), sl_b its
+ * bits, sl_m a mask as comparisons make it.  Arithmetic and comparisons are written with operators;
+ * slv_name() are the functions of sl_math.h, from the same source.  Intrinsics appear only where
+ * the extensions lose speed (blend, root, minimum, "any lane"), and never change a bit.
  */
 #ifndef SL_LANES_H
 #define SL_LANES_H
@@ -47,7 +47,8 @@ typedef int sl_m;
 
 #elif SL_W == 2 || SL_W == 4 || SL_W == 8 || SL_W == 16
 
-#pragma GCC diagnostic ignored "-Wpsabi" /* vectors are passed between static functions of one file only */
+/* vectors are passed between static functions of one file only */
+#pragma GCC diagnostic ignored "-Wpsabi"
 
 typedef double sl_v __attribute__((vector_size(8 * SL_W)));
 typedef uint64_t sl_b __attribute__((vector_size(8 * SL_W)));
@@ -62,7 +63,8 @@ typedef __m512d sl_native;
 #define SL_NATIVE_SELECT(m, a, b) \
   _mm512_castsi512_pd(_mm512_ternarylogic_epi64(_mm512_castpd_si512(m), _mm512_castpd_si512(a), \
                                                 _mm512_castpd_si512(b), 0xca /* m ? a : b */))
-#define SL_NATIVE_PICK(at, a, b) _mm512_mask_blend_pd(_mm512_movepi64_mask(_mm512_castpd_si512(at)), a, b)
+#define SL_NATIVE_PICK(at, a, b) \
+  _mm512_mask_blend_pd(_mm512_movepi64_mask(_mm512_castpd_si512(at)), a, b)
 #define SL_NATIVE_TOPS(m) ((unsigned)_mm512_movepi64_mask(_mm512_castpd_si512(m)))
 #define SL_NATIVE_MIN _mm512_min_pd
 #define SL_NATIVE_MAX _mm512_max_pd
@@ -127,7 +129,9 @@ static inline sl_v slv_select(sl_m m, sl_v a, sl_v b) {
   return pa.all;
 }
 #else
-static inline sl_v slv_select(sl_m m, sl_v a, sl_v b) { return (sl_v)(((sl_b)m & (sl_b)a) | (~(sl_b)m & (sl_b)b)); }
+static inline sl_v slv_select(sl_m m, sl_v a, sl_v b) {
+  return (sl_v)(((sl_b)m & (sl_b)a) | (~(sl_b)m & (sl_b)b));
+}
 #endif
 
 /* b where the top bit of `at` is set, else a */
@@ -231,8 +235,8 @@ static inline sl_v slv_put(sl_v x, int lane, double value) {
 }
 
 /*
- * slv_name(x): complete.  Rare lanes leave the fast path through a branch, out of line and through memory, so that
- * the fast path keeps its registers.
+ * slv_name(x): complete.  Rare lanes leave the fast path through a branch, out of line and through
+ * memory, so that the fast path keeps its registers.
  */
 #define SL_F sl_v
 #define SL_B sl_b
@@ -248,10 +252,11 @@ static inline sl_v slv_put(sl_v x, int lane, double value) {
     for (int lane = 0; lane < SL_W; lane++)                                      \
       if (!SL_LANE(*ok, lane)) SL_LANE(*r, lane) = sl_##name(SL_LANE(*x, lane)); \
   }
-#define SL_DEFINE_PATCH2(name)                                                                      \
-  SL_RARE void slv_##name(sl_v *r, const sl_v *x, const sl_v *y, const sl_m *ok) {                  \
-    for (int lane = 0; lane < SL_W; lane++)                                                         \
-      if (!SL_LANE(*ok, lane)) SL_LANE(*r, lane) = sl_##name(SL_LANE(*x, lane), SL_LANE(*y, lane)); \
+#define SL_DEFINE_PATCH2(name)                                                     \
+  SL_RARE void slv_##name(sl_v *r, const sl_v *x, const sl_v *y, const sl_m *ok) { \
+    for (int lane = 0; lane < SL_W; lane++)                                        \
+      if (!SL_LANE(*ok, lane))                                                     \
+        SL_LANE(*r, lane) = sl_##name(SL_LANE(*x, lane), SL_LANE(*y, lane));       \
   }
 #define SL_PATCH1(ok, r, name, x)           \
   do {                                      \
@@ -300,9 +305,10 @@ SL_RARE void slv_reduce_rare(const sl_v *x, sl_v *hi, sl_v *lo, sl_b *n, const s
 #include "sl_math.h"
 
 /*
- * slv_name_fast(x, &ok): the same without any branch, so that a whole evaluation is one block for the compiler to
- * schedule.  Lanes that slv_name(x) would have patched are cleared in ok, their result is meaningless: start with
- * ok = slv_yes() and, unless slv_all(ok), evaluate again with slv_name.  Where ok stays set the bits are the same.
+ * slv_name_fast(x, &ok): the same without any branch, so that a whole evaluation is one block for
+ * the compiler to schedule.  Lanes that slv_name(x) would have patched are cleared in ok, their
+ * result is meaningless: start with ok = slv_yes() and, unless slv_all(ok), evaluate again with
+ * slv_name.  Where ok stays set the bits are the same.
  */
 static inline sl_m slv_yes(void) { return slv_set(0.0) == 0.0; }
 

@@ -1,10 +1,10 @@
 /*
  * sl_mathf.h - elementary functions in single precision that give the same bits everywhere.
  *
- * The float counterpart of sl_math.h, under the same rules: IEEE float +, -, *, /, sqrt, comparisons and integer
- * operations, nothing else. No double anywhere, no libm call, no state, no FMA. Errors are below 2 ulp over the whole
- * float range; special values are those of C99 Annex F. Not reproducible: the sign and payload of a NaN. Not supported:
- * flush-to-zero.
+ * The float counterpart of sl_math.h, under the same rules: IEEE float +, -, *, /, sqrt,
+ * comparisons and integer operations, nothing else. No double anywhere, no libm call, no state, no
+ * FMA. Errors are below 2 ulp over the whole float range; special values are those of C99 Annex F.
+ * Not reproducible: the sign and payload of a NaN. Not supported: flush-to-zero.
  */
 #ifndef SL_MATHF_H
 #define SL_MATHF_H
@@ -21,9 +21,11 @@
 #if !defined(UINT32_MAX) || !defined(UINT64_MAX)
 #error "sl_mathf.h needs uint32_t and uint64_t, which this compiler does not have"
 #endif
-/* 1: double, 2: long double, 64: double, negative: unknown; with 16 and 32 float arithmetic is float */
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16 && FLT_EVAL_METHOD != 32
-#error "sl_mathf.h needs floats evaluated as float: on x86 -msse2 -mfpmath=sse, on s390x -fexcess-precision=fast"
+/* 1: double, 2: long double, 64: double, negative: unknown; with 16 and 32 float arithmetic is
+ * float */
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16 && \
+    FLT_EVAL_METHOD != 32
+#error "sl_mathf.h needs floats evaluated as float: -mfpmath=sse or -fexcess-precision=fast"
 #endif
 typedef char slf_float_has_the_size_of_uint32_t[sizeof(float) == sizeof(uint32_t) ? 1 : -1];
 #ifdef __clang__
@@ -42,8 +44,10 @@ typedef char slf_float_has_the_size_of_uint32_t[sizeof(float) == sizeof(uint32_t
 #define SLF_NAN (slf_real(UINT32_C(0x7fc00000)))
 #define SLF_SIGN_BIT UINT32_C(0x80000000)
 #define SLF_EXPONENT UINT32_C(0x7f800000)
-#define SLF_HIGH_12 UINT32_C(0xfffff000) /* keeps 12 significant bits: the product of two such is exact */
-#define SLF_ROUND 0x1.8p23f              /* x + SLF_ROUND rounds x to an integer, held in the low bits */
+/* keeps 12 significant bits: the product of two such is exact */
+#define SLF_HIGH_12 UINT32_C(0xfffff000)
+/* x + SLF_ROUND rounds x to an integer, held in the low bits */
+#define SLF_ROUND 0x1.8p23f
 
 typedef union {
   float real;
@@ -78,7 +82,8 @@ static inline float slf_copysign(float x, float sign) {
 /* -1, 1, or x itself where x is a zero or NaN. */
 static inline float slf_sign(float x) { return x > 0.0f ? 1.0f : x < 0.0f ? -1.0f : x; }
 
-/* The correctly rounded root by integer arithmetic alone, digit by digit, for targets without a square-root instruction. */
+/* The correctly rounded root by integer arithmetic alone, digit by digit, for targets without a
+ * square-root instruction. */
 static inline float slf_sqrt_soft(float x) {
   uint32_t m = slf_bits(x), root = 0, twice = 0, digit;
   int e;
@@ -166,15 +171,15 @@ static inline float slf_hypot(float x, float y) {
   return SLF_LIKELY((q > 0x1p-90f) & (q < 0x1p120f)) ? slf_sqrt(q) : slf_hypot_rare(x, y);
 }
 
-/* ---- exp, expm1 -----------------------------------------------------------------------------------------
- * hi + lo = k ln 2 + r with |r| <= ln 2 / 2.  exp(r) = 1 + a + b, where a is the exact leading part of r and b
- * holds what is left of r and r^2 P(r).  On return *t = k + SLF_ROUND. */
+/* ---- exp, expm1 ---------------------------------------------------------------------------------
+ * hi + lo = k ln 2 + r with |r| <= ln 2 / 2.  exp(r) = 1 + a + b, where a is the exact leading part
+ * of r and b holds what is left of r and r^2 P(r).  On return *t = k + SLF_ROUND. */
 static inline void slf_exp_parts(float hi, float lo, float *t, float *a, float *b) {
   float n = hi * 0x1.715476p+0f + SLF_ROUND, k = n - SLF_ROUND;
   float rh = hi - k * 0x1.62e4p-1f, rl = lo - k * 0x1.7f7d1cp-20f;
   float r = rh + rl, r2 = r * r;
-  float p = (0.5f + r * 0x1.555556p-3f) +
-            r2 * ((0x1.5554e4p-5f + r * 0x1.1110ep-7f) + r2 * (0x1.6d492p-10f + r * 0x1.a12a42p-13f));
+  float p = (0.5f + r * 0x1.555556p-3f) + r2 * ((0x1.5554e4p-5f + r * 0x1.1110ep-7f) +
+                                                r2 * (0x1.6d492p-10f + r * 0x1.a12a42p-13f));
   *t = n;
   *a = rh;
   *b = rl + r2 * p;
@@ -196,11 +201,14 @@ static inline float slf_exp_sum_rare(float hi, float lo) {
   slf_exp_parts(hi, lo, &t, &a, &b);
   k = (int)(t - SLF_ROUND);
   half = k / 2;
-  return (1.0f + (a + b)) * slf_real((uint32_t)(half + 127) << 23) * slf_real((uint32_t)(k - half + 127) << 23);
+  return (1.0f + (a + b)) * slf_real((uint32_t)(half + 127) << 23) *
+         slf_real((uint32_t)(k - half + 127) << 23);
 }
 
 SLF_RARE float slf_exp_rare(float x) { return x != x ? x : slf_exp_sum_rare(x, 0.0f); }
-SLF_RARE float slf_expm1_rare(float x) { return x != x ? x : x < 0.0f ? -1.0f : slf_exp_sum_rare(x, 0.0f); }
+SLF_RARE float slf_expm1_rare(float x) {
+  return x != x ? x : x < 0.0f ? -1.0f : slf_exp_sum_rare(x, 0.0f);
+}
 
 static inline float slf_exp(float x) {
   return SLF_LIKELY(slf_fabs(x) < 87.0f) ? slf_exp_sum(x, 0.0f) : slf_exp_rare(x);
@@ -214,7 +222,7 @@ static inline float slf_expm1(float x) {
   return slf_copysign(((s - 1.0f) + s * a) + s * b, x);
 }
 
-/* ---- log, log1p -----------------------------------------------------------------------------------------
+/* ---- log, log1p ---------------------------------------------------------------------------------
  * x = 2^k m with m in [sqrt(1/2), sqrt(2)), f = m - 1, s = f / (2 + f), log m = 2 atanh s. */
 #define SLF_SQRT_HALF UINT32_C(0x3f3504f3)
 
@@ -227,12 +235,14 @@ static inline float slf_log_sum(float k, float f, float lo) {
 
 /* What the exponent field of the shifted bits counts, of an x that was multiplied by 2^scaled. */
 static inline float slf_exponent(uint32_t shifted, int scaled) {
-  return (float)((int)((shifted >> 23) ^ 0x100u) - (0x100 + scaled)); /* the field's sign bit, folded by hand */
+  /* the field's sign bit, folded by hand */
+  return (float)((int)((shifted >> 23) ^ 0x100u) - (0x100 + scaled));
 }
 
 static inline float slf_log_of(float x, int scaled) {
   uint32_t b = slf_bits(x), shifted = b - SLF_SQRT_HALF;
-  return slf_log_sum(slf_exponent(shifted, scaled), slf_real(b - (shifted & UINT32_C(0xff800000))) - 1.0f, 0.0f);
+  return slf_log_sum(slf_exponent(shifted, scaled),
+                     slf_real(b - (shifted & UINT32_C(0xff800000))) - 1.0f, 0.0f);
 }
 
 SLF_RARE float slf_log_rare(float x) {
@@ -248,7 +258,8 @@ static inline float slf_log(float x) {
 
 SLF_RARE float slf_log1p_rare(float x) { return x > 1.0f ? slf_log(x) : slf_log_rare(1.0f + x); }
 
-/* 1 + x = u + c exactly; c goes where it still counts: into f, and what f cannot hold to first order behind it. */
+/* 1 + x = u + c exactly; c goes where it still counts: into f, and what f cannot hold to first
+ * order behind it. */
 static inline float slf_log1p(float x) {
   float u = 1.0f + x, v = u - 1.0f, c = (1.0f - (u - v)) + (x - v), m, d, f, lost;
   uint32_t b = slf_bits(u), shifted = b - SLF_SQRT_HALF, kk = shifted & UINT32_C(0xff800000);
@@ -260,15 +271,16 @@ static inline float slf_log1p(float x) {
   return slf_copysign(slf_log_sum(slf_exponent(shifted, 0), f, lost * (1.0f - f + f * f)), x);
 }
 
-/* ---- sin, cos, tan --------------------------------------------------------------------------------------
- * x = n pi/2 + r, |r| <= pi/4, r as hi + lo; three 11-bit pieces of pi/2 make n times each exact for |x| < 2^13. */
+/* ---- sin, cos, tan ------------------------------------------------------------------------------
+ * x = n pi/2 + r, |r| <= pi/4, r as hi + lo; three 11-bit pieces of pi/2 make n times each exact
+ * for |x| < 2^13. */
 
-/* Payne and Hanek: the bits of x 2/pi around the binary point, from the bits of 2/pi that matter; |x| >= 2^13.
- * Returns n mod 4 and r = hi + lo; hi is NaN for an infinite or NaN x. */
+/* Payne and Hanek: the bits of x 2/pi around the binary point, from the bits of 2/pi that matter;
+ * |x| >= 2^13. Returns n mod 4 and r = hi + lo; hi is NaN for an infinite or NaN x. */
 SLF_RARE uint32_t slf_reduce_rare(float x, float *hi, float *lo) {
-  static const uint32_t two_over_pi[8] = {UINT32_C(0),          UINT32_C(0xa2f9836e), UINT32_C(0x4e441529),
-                                          UINT32_C(0xfc2757d1), UINT32_C(0xf534ddc0), UINT32_C(0xdb629599),
-                                          UINT32_C(0x3c439041), UINT32_C(0xfe5163ab)};
+  static const uint32_t two_over_pi[8] = {
+      UINT32_C(0),          UINT32_C(0xa2f9836e), UINT32_C(0x4e441529), UINT32_C(0xfc2757d1),
+      UINT32_C(0xf534ddc0), UINT32_C(0xdb629599), UINT32_C(0x3c439041), UINT32_C(0xfe5163ab)};
   uint32_t b = slf_bits(x), m = (b & UINT32_C(0x7fffff)) | UINT32_C(0x800000), t[3], n, sign = 0;
   int e = (int)((b & SLF_EXPONENT) >> 23), first = e - 150 - 2 + 32, i, shift;
   uint64_t low, mid, p;
@@ -277,9 +289,11 @@ SLF_RARE uint32_t slf_reduce_rare(float x, float *hi, float *lo) {
     *hi = SLF_NAN;
     return 0;
   }
-  for (i = 0; i < 3; i++) { /* 96 bits of 2/pi; those before them weigh multiples of 4 quarters of a turn */
+  /* 96 bits of 2/pi; those before them weigh multiples of 4 quarters of a turn */
+  for (i = 0; i < 3; i++) {
     int word = first / 32 + i, bit = first % 32;
-    t[i] = bit == 0 ? two_over_pi[word] : (two_over_pi[word] << bit) | (two_over_pi[word + 1] >> (32 - bit));
+    t[i] = bit == 0 ? two_over_pi[word]
+                    : (two_over_pi[word] << bit) | (two_over_pi[word + 1] >> (32 - bit));
   }
   low = (uint64_t)m * t[2];
   mid = (uint64_t)m * t[1] + (low >> 32);
@@ -293,8 +307,10 @@ SLF_RARE uint32_t slf_reduce_rare(float x, float *hi, float *lo) {
   }
   for (shift = 0; (p >> 63) == 0 && shift < 40; shift++) p <<= 1;
   p = (p >> 32) * UINT64_C(0xc90fdaa2); /* pi/2 in units of 2^-31 */
-  *hi = slf_real(slf_bits((float)(uint32_t)(p >> 40) * slf_real((uint32_t)(104 - shift) << 23)) ^ sign);
-  *lo = slf_real(slf_bits((float)((uint32_t)(p >> 16) & UINT32_C(0xffffff)) * slf_real((uint32_t)(80 - shift) << 23)) ^
+  *hi = slf_real(slf_bits((float)(uint32_t)(p >> 40) * slf_real((uint32_t)(104 - shift) << 23)) ^
+                 sign);
+  *lo = slf_real(slf_bits((float)((uint32_t)(p >> 16) & UINT32_C(0xffffff)) *
+                          slf_real((uint32_t)(80 - shift) << 23)) ^
                  sign);
   if ((b & SLF_SIGN_BIT) != 0) {
     *hi = -*hi;
@@ -353,9 +369,9 @@ static inline float slf_tan(float x) {
   return s / c;
 }
 
-/* ---- the cube-root family -------------------------------------------------------------------------------
- * y ~ x^(-1/3) from the bits of x divided by -3, one step of third order, then rounded to 8 bits so that y^3 is exact:
- * x^(-1/3) = y (1 + d) with d from h = 1 - x y^3. */
+/* ---- the cube-root family -----------------------------------------------------------------------
+ * y ~ x^(-1/3) from the bits of x divided by -3, one step of third order, then rounded to 8 bits so
+ * that y^3 is exact: x^(-1/3) = y (1 + d) with d from h = 1 - x y^3. */
 static inline float slf_rcbrt_parts(float x, float *d) {
   float y = slf_real(UINT32_C(0x54a2fa8c) - slf_bits(x) / 3), h = 1.0f - x * (y * y * y);
   y = y + (y * h) * (0x1.555556p-2f + h * 0x1.c71c72p-3f);
@@ -365,8 +381,8 @@ static inline float slf_rcbrt_parts(float x, float *d) {
   return y;
 }
 
-/* x^(-1/3), x^(-2/3) = y^2 (1 + d)^2, x^(1/3) = x y^2 (1 + d)^2, x^(2/3) = x y (1 + d): the leading products are exact,
- * x cut to 8 or 16 bits for that, and the small rest is added last. */
+/* x^(-1/3), x^(-2/3) = y^2 (1 + d)^2, x^(1/3) = x y^2 (1 + d)^2, x^(2/3) = x y (1 + d): the leading
+ * products are exact, x cut to 8 or 16 bits for that, and the small rest is added last. */
 static inline float slf_m1_3_sum(float x) {
   float d, y = slf_rcbrt_parts(x, &d);
   return y + y * d;
@@ -378,7 +394,8 @@ static inline float slf_m2_3_sum(float x) {
 }
 
 static inline float slf_p1_3_sum(float x) {
-  float d, y = slf_rcbrt_parts(x, &d), y2 = y * y, xh = slf_real(slf_bits(x) & UINT32_C(0xffff0000));
+  float d, y = slf_rcbrt_parts(x, &d), y2 = y * y,
+           xh = slf_real(slf_bits(x) & UINT32_C(0xffff0000));
   return xh * y2 + ((x - xh) * y2 + (x * y2) * (d + d + d * d));
 }
 
@@ -387,7 +404,8 @@ static inline float slf_p2_3_sum(float x) {
   return xh * y + ((x - xh) * y + (x * y) * d);
 }
 
-/* x^(thirds/3) of what the fast path leaves out: zeros, infinities, NaN, negative, very small and very large x. */
+/* x^(thirds/3) of what the fast path leaves out: zeros, infinities, NaN, negative, very small and
+ * very large x. */
 SLF_RARE float slf_thirds_rare(float x, int thirds) {
   float to, unit; /* x is multiplied by `to` = 2^(-+60), the result by unit^thirds */
   if (x != x) return x;
@@ -404,13 +422,21 @@ SLF_RARE float slf_thirds_rare(float x, int thirds) {
 }
 
 static inline int slf_thirds_usual(float x) { return (x > 0x1p-100f) & (x < 0x1p100f); }
-static inline float slf_pow_p1_3(float x) { return slf_thirds_usual(x) ? slf_p1_3_sum(x) : slf_thirds_rare(x, 1); }
-static inline float slf_pow_p2_3(float x) { return slf_thirds_usual(x) ? slf_p2_3_sum(x) : slf_thirds_rare(x, 2); }
-static inline float slf_pow_m1_3(float x) { return slf_thirds_usual(x) ? slf_m1_3_sum(x) : slf_thirds_rare(x, -1); }
-static inline float slf_pow_m2_3(float x) { return slf_thirds_usual(x) ? slf_m2_3_sum(x) : slf_thirds_rare(x, -2); }
+static inline float slf_pow_p1_3(float x) {
+  return slf_thirds_usual(x) ? slf_p1_3_sum(x) : slf_thirds_rare(x, 1);
+}
+static inline float slf_pow_p2_3(float x) {
+  return slf_thirds_usual(x) ? slf_p2_3_sum(x) : slf_thirds_rare(x, 2);
+}
+static inline float slf_pow_m1_3(float x) {
+  return slf_thirds_usual(x) ? slf_m1_3_sum(x) : slf_thirds_rare(x, -1);
+}
+static inline float slf_pow_m2_3(float x) {
+  return slf_thirds_usual(x) ? slf_m2_3_sum(x) : slf_thirds_rare(x, -2);
+}
 
-/* ---- pow ------------------------------------------------------------------------------------------------
- * Exponents with a kernel of their own.  pow(-0, 1/2) = +0 and pow(-inf, 1/2) = +inf, unlike sqrt. */
+/* ---- pow ----------------------------------------------------------------------------------------
+ * Exponents with a kernel of their own.  pow(-0, 1/2) = +0, pow(-inf, 1/2) = +inf, unlike sqrt. */
 static inline float slf_pow_p1_2(float x) { return x == -SLF_INF ? SLF_INF : slf_sqrt(x) + 0.0f; }
 static inline float slf_pow_m1_2(float x) { return 1.0f / slf_pow_p1_2(x); }
 static inline float slf_pow_p3_2(float x) { return x == -SLF_INF ? SLF_INF : x * slf_sqrt(x); }
@@ -419,9 +445,9 @@ static inline float slf_pow_m1(float x) { return 1.0f / x; }
 static inline float slf_pow_p2(float x) { return x * x; }
 static inline float slf_pow_p3(float x) { return x * x * x; }
 
-/* (*hi + *lo) = y log x, about 2^-33 relative, for normal positive x that was multiplied by 2^scaled.
- * x = 2^k m, m / c near 1 with c one of four short numbers whose logarithm is known as a sum of two floats;
- * s = (m - c) / (m + c) as sh + sl, log m = log c + 2 atanh s. */
+/* (*hi + *lo) = y log x, about 2^-33 relative, for normal positive x that was multiplied by
+ * 2^scaled. x = 2^k m, m / c near 1 with c one of four short numbers whose logarithm is known as a
+ * sum of two floats; s = (m - c) / (m + c) as sh + sl, log m = log c + 2 atanh s. */
 static inline void slf_pow_log(float x, float y, int scaled, float *hi, float *lo) {
   static const float short_c[4] = {1.0f, 0x1.2dp+0f, 0x1.728p+0f, 0x1.b3p+0f};
   static const float log_high[4] = {0.0f, 0x1.4ba37p-3f, 0x1.7a8c58p-2f, 0x1.0f7242p-1f};
@@ -430,7 +456,8 @@ static inline void slf_pow_log(float x, float y, int scaled, float *hi, float *l
   float k = slf_exponent(shifted, scaled), m = slf_real(b - (shifted & UINT32_C(0xff800000)));
   float c = short_c[quarter], f = m - c, u = m + c, v = 1.0f / u, s = f * v;
   float sh = slf_real(slf_bits(s) & SLF_HIGH_12), uh = slf_real(slf_bits(u) & SLF_HIGH_12);
-  float sl = ((f - sh * uh) - sh * (m - (uh - c))) * v, ds = (sh - s) + sl; /* s + ds is the better s */
+  float sl = ((f - sh * uh) - sh * (m - (uh - c))) * v;
+  float ds = (sh - s) + sl; /* s + ds is the better s */
   float z = s * s, p = 0x1.555556p-1f + z * (0x1.999956p-2f + z * 0x1.258bfap-2f);
   float kl = k * 0x1.62e4p-1f, t = kl + log_high[quarter], tl = (kl - t) + log_high[quarter];
   float sh2 = sh + sh, h = t + sh2;
@@ -479,7 +506,8 @@ static inline float slf_pow_general(float x, float y) {
   return SLF_LIKELY(slf_fabs(hi) < 87.0f) ? slf_exp_sum(hi, lo) : slf_pow_rare(x, y);
 }
 
-/* pow; at these exponents it is by definition the kernel of that name (1/3 and 2/3 are the nearest floats). */
+/* pow; at these exponents it is by definition the kernel of that name (1/3 and 2/3 are the nearest
+ * floats). */
 static inline float slf_pow(float x, float y) {
   if (y == 0x1.555556p-2f) return slf_pow_p1_3(x);
   if (y == -0x1.555556p-2f) return slf_pow_m1_3(x);

@@ -1,5 +1,6 @@
 /*
- * sl_tables.h - signals that come as tables: cubics on uniform knots, for the loop, exports and FMUs alike.
+ * sl_tables.h - signals that come as tables: cubics on uniform knots, for the loop, exports and
+ * FMUs alike.
  */
 #ifndef SL_TABLES_H
 #define SL_TABLES_H
@@ -18,8 +19,10 @@ typedef struct {
   const double *coefficients; /* intervals x channels x 4, c0 + c1 tau + c2 tau^2 + c3 tau^3 */
 } sl_table;
 
-/* Data of the interval that holds t: per table tau, s from the knot, and four coefficients a channel, into d[0], d[stride], ... */
-static inline void sl_table_data(const sl_table *tables, int count, double t, double *d, int stride) {
+/* Data of the interval that holds t: per table tau, s from the knot, and four coefficients a
+ * channel, into d[0], d[stride], ... */
+static inline void sl_table_data(const sl_table *tables, int count, double t, double *d,
+                                 int stride) {
   int i;
   for (i = 0; i < count; i++) {
     const sl_table *table = &tables[i];

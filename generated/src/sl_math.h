@@ -1,18 +1,21 @@
 /*
  * sl_math.h - elementary functions that give the same bits everywhere.
  *
- * Every result is a function of the argument bits alone: the kernels use IEEE double +, -, *, /, sqrt,
- * comparisons and integer operations, nothing else.  No libm call, no lookup table, no state, no FMA.
- * Any C99 compiler, optimisation level and instruction set agrees to the last bit, provided that the
- * compiler does not contract a*b+c (pass -ffp-contract=off) and evaluates double as double.
+ * Every result is a function of the argument bits alone: the kernels use IEEE double +, -, *, /,
+ * sqrt, comparisons and integer operations, nothing else.  No libm call, no lookup table, no state,
+ * no FMA. Any C99 compiler, optimisation level and instruction set agrees to the last bit, provided
+ * that the compiler does not contract a*b+c (pass -ffp-contract=off) and evaluates double as
+ * double.
  *
- * Errors are below 2 ulp over the whole double range (docs/math.md has the measured table); special values
- * are those of C99 Annex F.  Not reproducible: the sign and payload of a NaN.  Not supported: flush-to-zero.
+ * Errors are below 2 ulp over the whole double range (docs/math.md has the measured table); special
+ * values are those of C99 Annex F.  Not reproducible: the sign and payload of a NaN.  Not
+ * supported: flush-to-zero.
  *
- * How to read this file.  Part 1 are the scalar primitives.  Part 2 are the kernels, written once in terms of
- * SL_F (real), SL_B (its bits), SL_M (mask) and SL_FN(name).  Here they become sl_name() on double; sl_lanes.h
- * includes part 2 again and makes slv_name() on vectors of W doubles.  A kernel computes the common case
- * without branches; SL_PATCH then replaces the lanes outside it by a scalar sl_name_rare().
+ * How to read this file.  Part 1 are the scalar primitives.  Part 2 are the kernels, written once
+ * in terms of SL_F (real), SL_B (its bits), SL_M (mask) and SL_FN(name).  Here they become
+ * sl_name() on double; sl_lanes.h includes part 2 again and makes slv_name() on vectors of W
+ * doubles.  A kernel computes the common case without branches; SL_PATCH then replaces the lanes
+ * outside it by a scalar sl_name_rare().
  */
 #ifndef SL_MATH_H
 #define SL_MATH_H
@@ -24,17 +27,20 @@
 #error "sl_math.h needs IEEE arithmetic: compile without -ffast-math"
 #endif
 #if FLT_RADIX != 2 || DBL_MANT_DIG != 53 || DBL_MIN_EXP != -1021 || DBL_MAX_EXP != 1024
-#error "sl_math.h needs double to be 64-bit IEEE: with newer avr-gcc -mdouble=64, elsewhere export with --real float"
+#error "sl_math.h needs 64-bit IEEE doubles: avr-gcc -mdouble=64, or export with --real float"
 #endif
 #ifndef UINT64_MAX
 #error "sl_math.h needs uint64_t, which this compiler does not have: export with --real float"
 #endif
-#if defined(__FLOAT_WORD_ORDER__) && defined(__BYTE_ORDER__) && __FLOAT_WORD_ORDER__ != __BYTE_ORDER__
-#error "sl_math.h needs doubles in the byte order of integers: on ARM compile for VFP or the AAPCS, not for FPA"
+#if defined(__FLOAT_WORD_ORDER__) && defined(__BYTE_ORDER__) && \
+    __FLOAT_WORD_ORDER__ != __BYTE_ORDER__
+#error "sl_math.h needs doubles in the byte order of integers: on ARM VFP or AAPCS, not FPA"
 #endif
-/* 2: long double, negative: unknown; with 1 and with the values from 16 on double arithmetic is double */
-#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD == 2 || FLT_EVAL_METHOD > 64)
-#error "sl_math.h needs doubles evaluated as double, not in a longer format: on x86 compile with -msse2 -mfpmath=sse"
+/* 2: long double, negative: unknown; with 1 and with the values from 16 on double arithmetic is
+ * double */
+#if defined(FLT_EVAL_METHOD) && \
+    (FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD == 2 || FLT_EVAL_METHOD > 64)
+#error "sl_math.h needs doubles evaluated as double: on x86 compile with -msse2 -mfpmath=sse"
 #endif
 typedef char sl_double_has_the_size_of_uint64_t[sizeof(double) == sizeof(uint64_t) ? 1 : -1];
 #ifdef __clang__
@@ -51,7 +57,7 @@ typedef char sl_double_has_the_size_of_uint64_t[sizeof(double) == sizeof(uint64_
 #define SL_RARE static
 #endif
 
-/* ---- Part 1: scalar primitives ------------------------------------------------------------------------ */
+/* ---- Part 1: scalar primitives --------------------------------------------------------------- */
 
 #define SL_INF (sl_real(UINT64_C(0x7ff0000000000000)))
 #define SL_NAN (sl_real(UINT64_C(0x7ff8000000000000)))
@@ -59,8 +65,10 @@ typedef char sl_double_has_the_size_of_uint64_t[sizeof(double) == sizeof(uint64_
 #define SL_EXPONENT UINT64_C(0x7ff0000000000000)
 #define SL_FRACTION UINT64_C(0x000fffffffffffff)
 #define SL_ONE UINT64_C(0x3ff0000000000000)     /* the bits of 1.0 */
-#define SL_HIGH_26 UINT64_C(0xfffffffff8000000) /* leaves 26 significant bits: two such have an exact product */
-#define SL_ROUND 0x1.8p52                       /* x + SL_ROUND holds x, rounded to an integer, in its low bits */
+/* leaves 26 significant bits: two such have an exact product */
+#define SL_HIGH_26 UINT64_C(0xfffffffff8000000)
+/* x + SL_ROUND holds x, rounded to an integer, in its low bits */
+#define SL_ROUND 0x1.8p52
 #define SL_LN2_HI 0x1.62e42fefa38p-1            /* 42 bits: times an exponent it is exact */
 #define SL_LN2_LO 0x1.ef35793c7673p-45
 
@@ -95,7 +103,8 @@ static inline int sl_below(uint64_t a, uint64_t limit) { return a < limit; }
 static inline double sl_fmin(double a, double b) { return a < b ? a : b; }
 static inline double sl_fmax(double a, double b) { return a > b ? a : b; }
 
-/* The correctly rounded root in integers, digit by digit, for targets without a square-root instruction. */
+/* The correctly rounded root in integers, digit by digit, for targets without a square-root
+ * instruction. */
 static inline double sl_sqrt_soft(double x) {
   uint64_t m = sl_bits(x), root = 0, twice = 0, digit;
   int e;
@@ -170,7 +179,8 @@ static inline int sl_isfinite(double x) { return (sl_bits(x) & SL_EXPONENT) != S
 #define SL_B uint64_t
 #define SL_M int
 #define SL_FN(name) sl_##name
-#define SL_CHECKED(name) sl_##name /* a kernel with rare lanes; sl_lanes.h makes a second kind of those */
+/* a kernel with rare lanes; sl_lanes.h makes a second kind of those */
+#define SL_CHECKED(name) sl_##name
 #define SL_OK
 #define SL_PASS_OK
 #define SL_SCALAR
@@ -193,11 +203,13 @@ static inline int sl_isfinite(double x) { return (sl_bits(x) & SL_EXPONENT) != S
   } while (0)
 #endif /* SL_MATH_H */
 
-/* ---- Part 2: kernels, once per SL_FN ---------------------------------------------------------------- */
+/* ---- Part 2: kernels, once per SL_FN --------------------------------------------------------- */
 #ifdef SL_FN
 
-#define SL_EXPONENT_OF(shifted) SL_FN(real)(((shifted) >> 52) ^ UINT64_C(0x4330000000000800)) /* + SL_FIELD_BIAS */
-#define SL_FIELD_BIAS 4503599627372544.0                                                      /* 2^52 + 2048 */
+/* + SL_FIELD_BIAS */
+#define SL_EXPONENT_OF(shifted) SL_FN(real)(((shifted) >> 52) ^ UINT64_C(0x4330000000000800))
+/* 2^52 + 2048 */
+#define SL_FIELD_BIAS 4503599627372544.0
 /* x >= DBL_MIN and finite, from shifted = bits(x) - start */
 #define SL_IS_NORMAL(shifted, start) \
   SL_FN(below)((shifted) + (start) - UINT64_C(0x0010000000000000), UINT64_C(0x7fe0000000000000))
@@ -249,9 +261,10 @@ static inline SL_F SL_CHECKED(hypot)(SL_F x, SL_F y SL_OK) {
   return r;
 }
 
-/* ---- exp, expm1 -----------------------------------------------------------------------------------------
- * x = k ln 2 + r, |r| <= ln 2 / 2, exp(r) = 1 + r + r^2 P(r) with P minimax of degree 9.  r comes as rh, which is
- * exact, and rl: adding the small terms to each other first and rh last keeps the error below 1 ulp. */
+/* ---- exp, expm1 ---------------------------------------------------------------------------------
+ * x = k ln 2 + r, |r| <= ln 2 / 2, exp(r) = 1 + r + r^2 P(r) with P minimax of degree 9.  r comes
+ * as rh, which is exact, and rl: adding the small terms to each other first and rh last keeps the
+ * error below 1 ulp. */
 #ifdef SL_CORES
 /* rl + r^2 P(r) */
 static inline SL_F SL_FN(exp_tail)(SL_F rh, SL_F rl) {
@@ -271,8 +284,8 @@ static inline SL_F SL_FN(exp_sum)(SL_F hi, SL_F lo) {
   return SL_FN(real)(SL_FN(bits)(m) + (SL_FN(bits)(t) << 52));
 }
 
-/* exp(x) - 1 = 2^k (1 + r + ...) - 1 for |x| < 708, and in *lo what its rounding left over.  s = 2^k: s - 1 and s rh
- * are added while both are exact or nearly so. */
+/* exp(x) - 1 = 2^k (1 + r + ...) - 1 for |x| < 708, and in *lo what its rounding left over.  s =
+ * 2^k: s - 1 and s rh are added while both are exact or nearly so. */
 static inline SL_F SL_FN(expm1_sum)(SL_F x, SL_F *lo) {
   SL_F t = x * 0x1.71547652b82fep+0 + SL_ROUND, k = t - SL_ROUND, rh = x - k * SL_LN2_HI;
   SL_F s = SL_FN(real)((SL_FN(bits)(t) << 52) + SL_ONE), a = (s - 1.0) + s * rh;
@@ -293,7 +306,9 @@ static inline double sl_exp_sum_rare(double hi, double lo, int shift) {
 }
 
 SL_RARE double sl_exp_rare(double x) { return x != x ? x : sl_exp_sum_rare(x, 0.0, 0); }
-SL_RARE double sl_expm1_rare(double x) { return x != x ? x : x < 0.0 ? -1.0 : sl_exp_sum_rare(x, 0.0, 0); }
+SL_RARE double sl_expm1_rare(double x) {
+  return x != x ? x : x < 0.0 ? -1.0 : sl_exp_sum_rare(x, 0.0, 0);
+}
 SL_RARE double sl_cosh_rare(double x) { return x != x ? x : sl_exp_sum_rare(sl_fabs(x), 0.0, -1); }
 SL_RARE double sl_sinh_rare(double x) { return sl_copysign(sl_cosh_rare(x), x); }
 #endif
@@ -323,7 +338,8 @@ static inline SL_F SL_CHECKED(cosh)(SL_F x SL_OK) {
   return r;
 }
 
-/* (e + e / (1 + e)) / 2 with e + lo = exp|x| - 1; what the roundings of e and 1 + e left over enters to first order. */
+/* (e + e / (1 + e)) / 2 with e + lo = exp|x| - 1; what the roundings of e and 1 + e left over
+ * enters to first order. */
 static inline SL_F SL_CHECKED(sinh)(SL_F x SL_OK) {
   SL_F lo, e = SL_FN(expm1_sum)(SL_FN(fabs)(x), &lo), u = 1.0 + e, q = e / u, v = 1.0 - q;
   SL_F r = 0.5 * (e + (q + (lo * (1.0 + v * v) - q * v * (e - (u - 1.0)))));
@@ -333,9 +349,11 @@ static inline SL_F SL_CHECKED(sinh)(SL_F x SL_OK) {
 }
 
 #ifdef SL_CORES
-/* With e + lo = exp(2|x|) - 1: e / (2 + e), mended likewise, which is 1 - 2 / (2 + e); 1 to the last bit from 30 on. */
+/* With e + lo = exp(2|x|) - 1: e / (2 + e), mended likewise, which is 1 - 2 / (2 + e); 1 to the
+ * last bit from 30 on. */
 static inline SL_F SL_FN(tanh)(SL_F x) {
-  SL_F lo, a = SL_FN(fabs)(x), e = SL_FN(expm1_sum)(2.0 * SL_FN(fmin)(SL_FN(set)(30.0), a), &lo), u = 2.0 + e;
+  SL_F lo, a = SL_FN(fabs)(x), e = SL_FN(expm1_sum)(2.0 * SL_FN(fmin)(SL_FN(set)(30.0), a), &lo),
+           u = 2.0 + e;
   SL_M small = a < 0.55;
   SL_F q = SL_FN(select)(small, e, SL_FN(set)(2.0)) / u, v = 0.5 * (1.0 - q);
   SL_F r = SL_FN(select)(small, q + v * (2.0 * v * lo - q * (e - (u - 2.0))), 1.0 - q);
@@ -343,7 +361,7 @@ static inline SL_F SL_FN(tanh)(SL_F x) {
 }
 #endif
 
-/* ---- log, log1p -----------------------------------------------------------------------------------------
+/* ---- log, log1p ---------------------------------------------------------------------------------
  * x = 2^k m with m in [sqrt(1/2), sqrt(2)), f = m - 1, s = f / (2 + f), log m = 2 atanh s. */
 #define SL_SQRT_HALF UINT64_C(0x3fe6a09e667f3bcd)
 #ifdef SL_CORES
@@ -388,21 +406,24 @@ SL_RARE double sl_log1p_rare(double x) { return x > 1.0 ? sl_log(x) : sl_log_rar
 SL_DEFINE_PATCH1(log1p_rare)
 #endif
 
-/* 1 + x rounded gives k alone: f = x 2^-k + (2^-k - 1) is exact but for k = 1, x < 1/2, where `lost` is what f cannot
- * hold.  The sign is x's; that matters for -0 only. */
+/* 1 + x rounded gives k alone: f = x 2^-k + (2^-k - 1) is exact but for k = 1, x < 1/2, where
+ * `lost` is what f cannot hold.  The sign is x's; that matters for -0 only. */
 static inline SL_F SL_CHECKED(log1p)(SL_F x SL_OK) {
   SL_B shifted = SL_FN(bits)(1.0 + x) - SL_SQRT_HALF;
-  SL_F k = SL_EXPONENT_OF(shifted) - SL_FIELD_BIAS, scale = SL_FN(real)(SL_ONE - (shifted & ~SL_FRACTION));
+  SL_F k = SL_EXPONENT_OF(shifted) - SL_FIELD_BIAS,
+       scale = SL_FN(real)(SL_ONE - (shifted & ~SL_FRACTION));
   SL_F xs = x * scale, one = scale - 1.0, f = xs + one, lost = (one - f) + xs;
   SL_F r = SL_FN(log_sum)(k, f, k * SL_LN2_LO + lost);
   r = SL_FN(real)(SL_FN(bits)(r) | (SL_FN(bits)(x) & SL_SIGN_BIT));
-  SL_PATCH1(SL_FN(below)(shifted + (SL_SQRT_HALF - UINT64_C(0x3c90000000000000)), UINT64_C(0x41f0000000000000)), r,
-            log1p_rare, x);
+  SL_PATCH1(SL_FN(below)(shifted + (SL_SQRT_HALF - UINT64_C(0x3c90000000000000)),
+                         UINT64_C(0x41f0000000000000)),
+            r, log1p_rare, x);
   return r;
 }
 
-/* ---- sin, cos, tan --------------------------------------------------------------------------------------
- * x = n pi/2 + r, |r| <= pi/4, r as hi + lo.  Two 36-bit pieces of pi/2 and a double: n times a piece is exact. */
+/* ---- sin, cos, tan ------------------------------------------------------------------------------
+ * x = n pi/2 + r, |r| <= pi/4, r as hi + lo.  Two 36-bit pieces of pi/2 and a double: n times a
+ * piece is exact. */
 #ifdef SL_CORES
 #ifdef SL_SCALAR
 static inline void sl_mul64(uint64_t a, uint64_t b, uint64_t *hi, uint64_t *lo) {
@@ -412,8 +433,8 @@ static inline void sl_mul64(uint64_t a, uint64_t b, uint64_t *hi, uint64_t *lo) 
   *lo = (mid2 << 32) | (low & 0xffffffffu);
 }
 
-/* Payne and Hanek, for |x| >= 2^17: x 2/pi modulo 4 in integers, from the 192 bits of 2/pi that matter for it.
- * Returns n (modulo 4) and r; r is NaN for an infinite or NaN x. */
+/* Payne and Hanek, for |x| >= 2^17: x 2/pi modulo 4 in integers, from the 192 bits of 2/pi that
+ * matter for it. Returns n (modulo 4) and r; r is NaN for an infinite or NaN x. */
 SL_RARE uint64_t sl_reduce_rare(double x, double *hi, double *lo) {
   static const uint64_t two_over_pi[20] = {
       UINT64_C(0),                  UINT64_C(0xa2f9836e4e441529), UINT64_C(0xfc2757d1f534ddc0),
@@ -428,12 +449,14 @@ SL_RARE uint64_t sl_reduce_rare(double x, double *hi, double *lo) {
   int e = (int)((b & SL_EXPONENT) >> 52), first = e - 1013, i, shift;
   double unit;
   if (e == 2047) {
-    *hi = *lo = SL_NAN;
+    *hi = SL_NAN;
+    *lo = SL_NAN;
     return 0;
   }
   for (i = 0; i < 3; i++) { /* the bits before `first` weigh whole turns */
     int word = first / 64 + i, bit = first % 64;
-    t[i] = bit == 0 ? two_over_pi[word] : (two_over_pi[word] << bit) | (two_over_pi[word + 1] >> (64 - bit));
+    t[i] = bit == 0 ? two_over_pi[word]
+                    : (two_over_pi[word] << bit) | (two_over_pi[word + 1] >> (64 - bit));
   }
   sl_mul64(m, t[2], &h, &p2); /* p = m t modulo 2^192; 2^190 is a quarter turn */
   sl_mul64(m, t[1], &n, &l);
@@ -511,12 +534,14 @@ static inline SL_F SL_CHECKED(tan)(SL_F x SL_OK) {
   z = r * r;
   w = z * z;
   w2 = w * w;
-  p = ((0x1.555555555555ep-2 + z * 0x1.111111111055ap-3) + w * (0x1.ba1ba1bac4c32p-5 + z * 0x1.664f485c1bab1p-6)) +
+  p = ((0x1.555555555555ep-2 + z * 0x1.111111111055ap-3) +
+       w * (0x1.ba1ba1bac4c32p-5 + z * 0x1.664f485c1bab1p-6)) +
       w2 * (((0x1.226e3a9e886fbp-7 + z * 0x1.d6d2e39832e19p-9) +
              w * (0x1.7db1c05e29ffap-10 + z * 0x1.34ba7d4ef2468p-11)) +
             w2 * (((0x1.ff4176552c0b4p-13 + z * 0x1.5e2b7a21d8bd5p-14) +
                    w * (0x1.1a619f52cd4e0p-14 + z * -0x1.afb387026147cp-16)) +
-                  w2 * ((0x1.98753227f4433p-15 + z * -0x1.9784455fb73b8p-16) + w * 0x1.48d6819ff4912p-17)));
+                  w2 * ((0x1.98753227f4433p-15 + z * -0x1.9784455fb73b8p-16) +
+                        w * 0x1.48d6819ff4912p-17)));
   u = r * z * p;
   t = r + u;
   u = u + y * (1.0 + t * t);
@@ -529,15 +554,17 @@ static inline SL_F SL_CHECKED(tan)(SL_F x SL_OK) {
   return SL_FN(select)(x == 0.0, x, SL_FN(pick)(n << 63, t, q));
 }
 
-/* ---- atan, atan2, asin, acos ---------------------------------------------------------------------------- */
+/* ---- atan, atan2, asin, acos ----------------------------------------------------------------- */
 #ifdef SL_CORES
-/* The angle in [0, pi/2] whose tangent is y / x, both positive: atan c + atan t with c = 0, 1/2, 1, 3/2 or infinite,
- * c = b / a and t = (a y - b x) / (a x + b y), |t| <= 7/16. */
+/* The angle in [0, pi/2] whose tangent is y / x, both positive: atan c + atan t with c = 0, 1/2, 1,
+ * 3/2 or infinite, c = b / a and t = (a y - b x) / (a x + b y), |t| <= 7/16. */
 static inline SL_F SL_FN(angle)(SL_F y, SL_F x) {
   SL_M m1 = y >= 0.4375 * x, m2 = y >= 0.6875 * x, m3 = y >= 1.1875 * x, m4 = y >= 2.4375 * x;
-  SL_F a = SL_FN(select)(m4, SL_FN(set)(0.0), SL_FN(select)(m2, SL_FN(set)(1.0), SL_FN(set)(1.0) + SL_FN(true)(m1)));
+  SL_F a = SL_FN(select)(m4, SL_FN(set)(0.0),
+                         SL_FN(select)(m2, SL_FN(set)(1.0), SL_FN(set)(1.0) + SL_FN(true)(m1)));
   SL_F b = SL_FN(select)(m4, SL_FN(set)(1.0), SL_FN(select)(m3, SL_FN(set)(1.5), SL_FN(true)(m1)));
-  SL_F hi = SL_FN(if)(m1, SL_FN(set)(0x1.dac670561bb4fp-2)), lo = SL_FN(if)(m1, SL_FN(set)(0x1.a2b7f222f65e2p-56));
+  SL_F hi = SL_FN(if)(m1, SL_FN(set)(0x1.dac670561bb4fp-2)),
+       lo = SL_FN(if)(m1, SL_FN(set)(0x1.a2b7f222f65e2p-56));
   SL_F t, z, w, p;
   hi = SL_FN(select)(m2, SL_FN(set)(0x1.921fb54442d18p-1), hi);
   lo = SL_FN(select)(m2, SL_FN(set)(0x1.1a62633145c07p-55), lo);
@@ -552,16 +579,19 @@ static inline SL_F SL_FN(angle)(SL_F y, SL_F x) {
       w * ((-0x1.2492491ffcd99p-3 + z * 0x1.c71c6fde2bd99p-4) +
            w * ((-0x1.745cdbebc1a5fp-4 + z * 0x1.3b0f2453d8041p-4) +
                 w * ((-0x1.10d625585003ep-4 + z * 0x1.dddf46d42df51p-5) +
-                     w * ((-0x1.97a61cc5ac210p-5 + z * 0x1.2b228d2b176c3p-5) + w * -0x1.0a908cd5e801ap-6))));
+                     w * ((-0x1.97a61cc5ac210p-5 + z * 0x1.2b228d2b176c3p-5) +
+                          w * -0x1.0a908cd5e801ap-6))));
   return hi + (t + (lo + t * z * p));
 }
 
 static inline SL_F SL_FN(atan)(SL_F x) {
-  return SL_FN(copysign)(SL_FN(angle)(SL_FN(fmin)(SL_FN(set)(0x1p1000), SL_FN(fabs)(x)), SL_FN(set)(1.0)), x);
+  return SL_FN(copysign)(
+      SL_FN(angle)(SL_FN(fmin)(SL_FN(set)(0x1p1000), SL_FN(fabs)(x)), SL_FN(set)(1.0)), x);
 }
 
 #ifdef SL_SCALAR
-/* Infinities are compared by kind, zeros lie on an axis, everything else only needs another scale. */
+/* Infinities are compared by kind, zeros lie on an axis, everything else only needs another scale.
+ */
 SL_RARE double sl_atan2_rare(double y, double x) {
   double a = sl_fabs(y), b = sl_fabs(x), most = sl_fmax(a, b), r;
   double scale = most > 0x1p1000 ? 0x1p-100 : most < 0x1p-900 ? 0x1p100 : 1.0;
@@ -613,8 +643,10 @@ static inline SL_F SL_FN(acos)(SL_F x) {
   sl = (z - sh * sh) / SL_FN(fmax)(SL_FN(set)(DBL_MIN), s + sh);
   tail = SL_FN(asin_tail)(z);
   w = s * tail;
-  r = SL_FN(select)(x < 0.0, 0x1.921fb54442d18p+0 - (s + (w - 0x1.1a62633145c07p-54)), sh + (w + sl));
-  return SL_FN(select)(small, 0x1.921fb54442d18p+0 - (x - (0x1.1a62633145c07p-54 - x * tail)), r + r);
+  r = SL_FN(select)(x < 0.0, 0x1.921fb54442d18p+0 - (s + (w - 0x1.1a62633145c07p-54)),
+                    sh + (w + sl));
+  return SL_FN(select)(small, 0x1.921fb54442d18p+0 - (x - (0x1.1a62633145c07p-54 - x * tail)),
+                       r + r);
 }
 #endif
 
@@ -622,13 +654,15 @@ static inline SL_F SL_CHECKED(atan2)(SL_F y, SL_F x SL_OK) {
   SL_F a = SL_FN(fabs)(y), b = SL_FN(fabs)(x), r = SL_FN(angle)(a, b);
   r = SL_FN(select)(x < 0.0, 0x1.921fb54442d18p+1 - (r - 0x1.1a62633145c07p-53), r);
   r = SL_FN(copysign)(r, y);
-  SL_PATCH2((a > 0x1p-1000) & (a < 0x1p1000) & (b > 0x1p-1000) & (b < 0x1p1000), r, atan2_rare, y, x);
+  SL_PATCH2((a > 0x1p-1000) & (a < 0x1p1000) & (b > 0x1p-1000) & (b < 0x1p1000), r, atan2_rare, y,
+            x);
   return r;
 }
 
-/* ---- the cube-root family -------------------------------------------------------------------------------
- * y ~ x^(-1/3) from the bits of x divided by -3 (in floating point: lanes have no 64-bit division), one step of
- * third order, then cut to 17 bits so that y^3 is exact: x^(-1/3) = y (1 + d), d from h = 1 - x y^3. */
+/* ---- the cube-root family -----------------------------------------------------------------------
+ * y ~ x^(-1/3) from the bits of x divided by -3 (in floating point: lanes have no 64-bit division),
+ * one step of third order, then cut to 17 bits so that y^3 is exact: x^(-1/3) = y (1 + d), d from h
+ * = 1 - x y^3. */
 #ifdef SL_CORES
 static inline SL_F SL_FN(rcbrt_parts)(SL_F x, SL_F *d) {
   SL_F t = SL_FN(real)((SL_FN(bits)(x) >> 20) | UINT64_C(0x4330000000000000));
@@ -641,8 +675,8 @@ static inline SL_F SL_FN(rcbrt_parts)(SL_F x, SL_F *d) {
   return y;
 }
 
-/* x^(-1/3), x^(-2/3) = y^2 (1 + d)^2, x^(1/3) = x y^2 (1 + d)^2, x^(2/3) = x y (1 + d).  The leading products are
- * exact, x cut to 19 or 26 bits for that, and the small rest is added last. */
+/* x^(-1/3), x^(-2/3) = y^2 (1 + d)^2, x^(1/3) = x y^2 (1 + d)^2, x^(2/3) = x y (1 + d).  The
+ * leading products are exact, x cut to 19 or 26 bits for that, and the small rest is added last. */
 static inline SL_F SL_FN(m1_3_sum)(SL_F x) {
   SL_F d, y = SL_FN(rcbrt_parts)(x, &d);
   return y + y * d;
@@ -666,7 +700,8 @@ static inline SL_F SL_FN(p2_3_sum)(SL_F x) {
 }
 
 #ifdef SL_SCALAR
-/* x^(thirds/3) of what the fast path leaves out: zeros, infinities, NaN, negative, very small and very large x. */
+/* x^(thirds/3) of what the fast path leaves out: zeros, infinities, NaN, negative, very small and
+ * very large x. */
 SL_RARE double sl_thirds_rare(double x, int thirds) {
   double scale, back; /* (scale x)^(1/3) back = x^(1/3) */
   if (x != x) return x;
@@ -723,7 +758,7 @@ static inline SL_F SL_CHECKED(cbrt)(SL_F x SL_OK) {
   return SL_FN(copysign)(SL_CHECKED(pow_p1_3)(SL_FN(fabs)(x) SL_PASS_OK), x);
 }
 
-/* ---- pow ------------------------------------------------------------------------------------------------
+/* ---- pow ----------------------------------------------------------------------------------------
  * First the other exponents with a kernel of their own. */
 #ifdef SL_CORES
 static inline SL_F SL_FN(pow_p1)(SL_F x) { return x; }
@@ -758,20 +793,23 @@ static inline SL_F SL_CHECKED(pow_p3_2)(SL_F x SL_OK) {
 }
 
 #ifdef SL_CORES
-/* *hi + *lo = y log x to about 2^-63 relative, for normal positive x with its bits shifted by SL_POW_START and `bias`
- * SL_FIELD_BIAS plus the scaling of x.  x = 2^k m; m / c is near 1 for one of four 26-bit numbers c whose logarithms
- * are almost doubles; s = (m - c) / (m + c) as sh + sl, log m = log c + 2 atanh s. */
+/* *hi + *lo = y log x to about 2^-63 relative, for normal positive x with its bits shifted by
+ * SL_POW_START and `bias` SL_FIELD_BIAS plus the scaling of x.  x = 2^k m; m / c is near 1 for one
+ * of four 26-bit numbers c whose logarithms are almost doubles; s = (m - c) / (m + c) as sh + sl,
+ * log m = log c + 2 atanh s. */
 #define SL_POW_START UINT64_C(0x3fed580000000000)
 static inline void SL_FN(pow_log)(SL_B shifted, SL_F y, double bias, SL_F *hi, SL_F *lo) {
   SL_B first = shifted << 12, second = shifted << 13;
   SL_F k = SL_EXPONENT_OF(shifted) - bias, m = SL_FN(real)((shifted & SL_FRACTION) + SL_POW_START);
   SL_F c = SL_FN(pick)(first, SL_FN(pick)(second, SL_FN(set)(1.0), SL_FN(set)(0x1.2d26acp+0)),
                        SL_FN(pick)(second, SL_FN(set)(0x1.72d4cp+0), SL_FN(set)(0x1.b372a8p+0)));
-  SL_F log_c = SL_FN(pick)(first, SL_FN(pick)(second, SL_FN(set)(0.0), SL_FN(set)(0x1.4caa7dcbe8acfp-3)),
-                           SL_FN(pick)(second, SL_FN(set)(0x1.7b7679c3bb462p-2), SL_FN(set)(0x1.0ff923a807833p-1)));
+  SL_F log_c = SL_FN(pick)(
+      first, SL_FN(pick)(second, SL_FN(set)(0.0), SL_FN(set)(0x1.4caa7dcbe8acfp-3)),
+      SL_FN(pick)(second, SL_FN(set)(0x1.7b7679c3bb462p-2), SL_FN(set)(0x1.0ff923a807833p-1)));
   SL_F f = m - c, u = m + c, v = 1.0 / u, s = f * v;
   SL_F sh = SL_FN(real)(SL_FN(bits)(s) & SL_HIGH_26), uh = SL_FN(real)(SL_FN(bits)(u) & SL_HIGH_26);
-  SL_F sl = ((f - sh * uh) - sh * (m - (uh - c))) * v, ds = (sh - s) + sl; /* s + ds is the better s */
+  SL_F sl = ((f - sh * uh) - sh * (m - (uh - c))) * v;
+  SL_F ds = (sh - s) + sl; /* s + ds is the better s */
   SL_F z = s * s, w = z * z;
   SL_F p = (0x1.5555555555555p-1 + z * 0x1.9999999999ac0p-2) +
            w * ((0x1.2492492413f3bp-2 + z * 0x1.c71c74dd75d28p-3) +
@@ -829,8 +867,9 @@ static inline SL_F SL_CHECKED(pow_general)(SL_F x, SL_F y SL_OK) {
   return r;
 }
 
-/* The exponents y at which pow(x, y) is by definition the kernel pow_name(x); 1/3 and 2/3 are the nearest doubles.
- * Their fractions have nothing, or 0101...01, below the first bit: that is how SL_POW_LISTED knows them. */
+/* The exponents y at which pow(x, y) is by definition the kernel pow_name(x); 1/3 and 2/3 are the
+ * nearest doubles. Their fractions have nothing, or 0101...01, below the first bit: that is how
+ * SL_POW_LISTED knows them. */
 #define SL_POW_LIST(entry)           \
   entry(0x1.5555555555555p-2, p1_3)  \
   entry(-0x1.5555555555555p-2, m1_3) \
@@ -847,8 +886,10 @@ static inline SL_F SL_CHECKED(pow_general)(SL_F x, SL_F y SL_OK) {
 
 #ifdef SL_CORES
 #define SL_POW_ALL(value, name) if (SL_FN(all)(y == (value))) return SL_FN(pow_##name)(x);
-#define SL_POW_ANY(value, name) if (SL_FN(any)(y == (value))) r = SL_FN(select)(y == (value), SL_FN(pow_##name)(x), r);
-/* pow where at least one lane may have a listed exponent: one branch if all have the same, else lane by lane. */
+#define SL_POW_ANY(value, name) \
+  if (SL_FN(any)(y == (value))) r = SL_FN(select)(y == (value), SL_FN(pow_##name)(x), r);
+/* pow where at least one lane may have a listed exponent: one branch if all have the same, else
+ * lane by lane. */
 SL_POW_INLINE SL_F SL_FN(pow_listed)(SL_F x, SL_F y) {
   SL_F r;
   SL_POW_LIST(SL_POW_ALL)

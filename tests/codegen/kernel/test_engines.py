@@ -1,6 +1,7 @@
 """Both engines, any width, any compiler: the same bits (docs/equal-bits.md)."""
 
 import itertools
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import get_args
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 
 from springline.codegen.kernel import Engine, KernelOptions, KernelSpec, LoopSettings, Runs, lanes, toolchain
 from springline.codegen.kernel.compiled import compile_kernel
-from springline.codegen.program import Program
+from springline.codegen.kernel.source import print_kernel
+from springline.codegen.program import LoopGraph, Program, UnprintableOperation
 from springline.model.symbolic import as_written
+from springline.model.terms import Term
 
 Values = Callable[..., NDArray[np.float64]]
 SHORT = LoopSettings(steps=400, step=1e-4, output_every=50)
@@ -279,6 +282,9 @@ def test_the_kernel_is_written_for_a_reader(shaken: Program, values_of: Values) 
         "const sl_v control_delta = p[0][g]",
         "/* sq(control_delta) */",
         "slv_sincos_fast",
+        "const sl_v de_lift_0 = dq1d_lift_0 - dq1_lift_0;",
+        "const sl_v u_e_rotation_1 = ",
+        "const sl_v z_lift_1 = slv_set(2000000.0) * a",
     ):
         assert text in emission.text, text
     assert emission.tunable == ("control.delta",)
@@ -286,6 +292,40 @@ def test_the_kernel_is_written_for_a_reader(shaken: Program, values_of: Values) 
     assert emission.sizes["varying"] == 0, "nothing that depends on time varies from run to run"
     assert emission.counts["closed"] < 200
     assert emission.text == lanes.emit(shaken, baked, 2).text
+
+
+@pytest.mark.parametrize("parameters", ["tunable", "baked"])
+def test_names_of_parts_change_nothing_but_names(
+    shaken: Program, values_of: Values, parameters: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keys = [slot.key for slot in shaken.system.slots]
+    baked = dict(zip(keys, values_of(shaken), strict=True)) if parameters == "baked" else {}
+    named = lanes.emit(shaken, baked, 2)
+    monkeypatch.setattr(LoopGraph, "_labelled", lambda *_: [])
+    numbered = lanes.emit(shaken, baked, 2)
+
+    def statements(text: str) -> str:
+        """Without comments, every identifier by when it came first in its function."""
+        functions = re.split(r"^}$", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL), flags=re.MULTILINE)
+        found = []
+        for function in functions:
+            order: dict[str, str] = {}
+            found.append(re.sub(r"\b[A-Za-z_]\w*", lambda word: order.setdefault(word[0], f"i{len(order)}"), function))  # noqa: B023
+        return "}".join(found)
+
+    assert statements(named.text) == statements(numbered.text)
+    assert named.text.count("dsurface_lift_0") > 2 and "dsurface" not in numbered.text
+    assert (named.sizes, named.counts) == (numbered.sizes, numbered.counts)
+
+
+def test_a_part_gives_way_where_another_is_called_so(shaken: Program, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the parts are called, the kernel compiles: who comes later, or against C, has a number."""
+    words = itertools.cycle(["ok", "x", "a7", "r0", "now", "double", "e_lift", "sin_q1_rotation", "slv_exp", "mine"])
+    monkeypatch.setattr(Term, "labels", lambda term, _: list(itertools.islice(words, term.value.numel())))
+    options = KernelOptions(width=2, groups=2, flags=("-O0",))
+    source = print_kernel(shaken, KernelSpec(shaken.system.structure, options=options))
+    assert "const sl_v mine_0 = " in dict(source.files)["kernel.h"]
+    toolchain.build_library(dict(source.files), main="loop.c", flags=source.flags)
 
 
 def test_signals_of_its_own_make_a_run_compute_them(shaken: Program, values_of: Values) -> None:

@@ -95,7 +95,7 @@ def test_a_double_of_32_bits_is_refused(folder: Callable[[Any], Path], require_t
     for source in sources(export)[:2]:
         done = compiled(compiler, export, "-std=c99", "-mmcu=atmega2560", "-c", source, "-o", "/dev/null")
         assert done.returncode != 0
-        assert "needs double to be 64-bit IEEE" in done.stderr
+        assert "needs 64-bit IEEE doubles" in done.stderr
         assert "--real float" in done.stderr
 
 

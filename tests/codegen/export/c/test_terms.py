@@ -1,17 +1,22 @@
 """Exported C reads as the law does: sections, the model's names, parameters by theirs; nothing else is computed."""
 
+import itertools
 import re
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import pytest
 
 from springline.codegen.export import bind
 from springline.codegen.export.c import generate_files
+from springline.codegen.export.c.interface import TypedInterface
+from springline.codegen.export.c.model import model_files
 from springline.codegen.kernel import toolchain
 from springline.model import Law, Parameter, Structure, System
 from springline.model.control import LAWS
@@ -25,8 +30,11 @@ SECTIONS = [
     "slow control: computed torque, (14), (25)",
     "fast control, (33)",
     "command, limited per motor, (13), E4",
-    "springs and motors, (1)",
-    "arm on its moving base, (1)",
+    "springs, (1)",
+    "motors, (1)",
+    "mass matrix of the arm, (1)",
+    "Coriolis, centrifugal and gravity forces less what the moving base adds, (1)",
+    "accelerations of the joints, (1)",
 ]
 
 
@@ -72,20 +80,51 @@ def test_values_are_called_as_in_the_model(name: str, statement: str, joint: str
 def test_baked_parameters_are_called_by_their_names_and_have_their_values() -> None:
     scenario = load_scenario("paper/nominal")
     values = {slot.symbol: value for slot, value in zip(scenario.system().slots, scenario.values(), strict=True)}
-    found = [item for item in constants(source()) if not re.fullmatch(r"c\d+", item[0])]
+    found = [item for item in constants(source()) if ";" in item[2]]
     assert {"control_k1", "control_lambda", "control_a_max_rotation", "plant_k_s2"} <= {name for name, _, _ in found}
     for name, value, _ in found:
         assert value == values[name]
 
 
+def test_a_body_tells_the_names_of_its_constants() -> None:
+    loaded = load_scenario("paper/nominal")
+    body = TypedInterface(bind(loaded.structure(), loaded.values())).bodies["control"]
+    assert {"control_a_max_lift", "control_a_max_rotation", "H_lift_lift", "c0"} <= body.constants
+    assert body.constants == {line.split()[2] for line in body.lines if re.match(r"const \w+ \w+ = .*/\*", line)}
+
+
 def test_what_comes_from_several_says_how_to_the_last_bit() -> None:
     scenario = load_scenario("paper/nominal")
     values = {slot.symbol: value for slot, value in zip(scenario.system().slots, scenario.values(), strict=True)}
-    found = [item for item in constants(source()) if re.fullmatch(r"c\d+", item[0])]
+    found = [item for item in constants(source()) if ";" not in item[2]]
     assert len(found) > 10
+    assert ("M1_lift_lift", 50.0, "plant_m3 + plant_m2") in found
     for _, value, formula in found:
         python = re.sub(r"(?<=[\w)]) (?=[\w(])", " * ", formula).replace("^", "**")
         assert eval(python, {}, values) == value, formula  # noqa: S307 - our own text
+
+
+@pytest.mark.parametrize("tunable", [(), "all"])
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("prefix", ["springline", "manipulator_on_a_ship_number_7"])
+def test_no_line_of_the_models_functions_is_too_long(prefix: str, real: Any, tunable: Any) -> None:
+    """And what follows a comment's first line stands below its first word."""
+    loaded = load_scenario("paper/nominal", {"control.mu": 12.25})
+    export = bind(loaded.structure(), loaded.values(), prefix=prefix, real=real, tunable=tunable)
+    for path, content in model_files(export).items():
+        lines = content.decode().splitlines()
+        assert [line for line in lines if len(line) > 100] == [], path
+        for first, second in itertools.pairwise(lines):
+            if re.match(r"  const \w+ \w+ = .*; +/\*(?!.*\*/)", first):
+                assert second.index(second.split()[0]) == first.index("/*") + 3, second
+
+
+def test_no_line_of_the_mathematics_is_too_long() -> None:
+    folder = resources.files("springline.codegen") / "runtime"
+    headers = [path for path in folder.iterdir() if path.name.startswith("sl_")]
+    assert len(headers) >= 5
+    for path in headers:
+        assert [line for line in path.read_text().splitlines() if len(line) > 100] == [], path.name
 
 
 @pytest.mark.parametrize("drive", ["elastic", "rigid"])
