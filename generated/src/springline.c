@@ -51,33 +51,41 @@ static int springline_evaluate_control(
     springline_command *command,
     springline_diagnostics *diagnostics) {
   (void)controller;
-  const double control_k1 = 3.0;               /* SI; gain of the reaching law's first term */
-  const double control_k2 = 5.0;               /* SI; gain of the reaching law's second term */
-  const double control_k3 = 12.0;              /* SI; gain of the reaching law's third term */
-  const double control_epsilon_log = 10.0;     /* SI; factor inside the logarithm */
-  const double control_zeta = 0.9;             /* 1; exponent of the variable power */
-  const double control_mu_lift = 12.0;         /* 1/s; surface gain of the odd power e^(l/m)
-                                                  (lift) */
-  const double control_mu_rotation = 5.0;      /* 1/s; surface gain of the odd power e^(l/m)
-                                                  (rotation) */
-  const double control_lambda = 5.0;           /* 1/s; surface gain of the terminal term e^(p/r) */
-  const double control_K_f_lift = 200.0;       /* N s/m; fast control gain on dq1 - dq2 (lift) */
-  const double control_K_f_rotation = 2.6;     /* N m s/rad; fast control gain on dq1 - dq2
-                                                  (rotation) */
-  const double control_a_max_lift = 200.0;     /* m/s^2; limit on the reaching law's acceleration
-                                                  (lift) */
-  const double control_a_max_rotation = 200.0; /* rad/s^2; limit on the reaching law's
-                                                  acceleration (rotation) */
-  const double c0 = 0.0025000000000000005;     /* control_delta^2 */
-  const double c1 = -200.0;                    /* -control_a_max_lift */
-  const double c2 = -200.0;                    /* -control_a_max_rotation */
-  const double c3 = 52.0;                      /* (mechanism_m3 + mechanism_m2) + drive_m_l */
-  const double c4 = 29.6;                      /* mechanism_m3 mechanism_L3 */
-  const double c5 = 490.0;                     /* (mechanism_g mechanism_m3) + (mechanism_g
-                                                  mechanism_m2) */
-  const double c6 = 29.215333333333334;        /* (mechanism_J + ((mechanism_m3 mechanism_L3)
-                                                  mechanism_L3)) + drive_I */
-  const double c7 = 290.08;                    /* (mechanism_g mechanism_m3) mechanism_L3 */
+  const double control_k1 = 3.0;                         /* SI; gain of the reaching law's first
+                                                            term */
+  const double control_k2 = 5.0;                         /* SI; gain of the reaching law's second
+                                                            term */
+  const double control_k3 = 12.0;                        /* SI; gain of the reaching law's third
+                                                            term */
+  const double control_epsilon_log = 10.0;               /* SI; factor inside the logarithm */
+  const double control_zeta = 0.9;                       /* 1; exponent of the variable power */
+  const double control_mu_lift = 12.0;                   /* 1/s; surface gain of the odd power
+                                                            e^(l/m) (lift) */
+  const double control_mu_rotation = 5.0;                /* 1/s; surface gain of the odd power
+                                                            e^(l/m) (rotation) */
+  const double control_lambda = 5.0;                     /* 1/s; surface gain of the terminal
+                                                            term e^(p/r) */
+  const double control_K_f_lift = 200.0;                 /* N s/m; fast control gain on dq1 - dq2
+                                                            (lift) */
+  const double control_K_f_rotation = 2.6;               /* N m s/rad; fast control gain on dq1 -
+                                                            dq2 (rotation) */
+  const double control_a_max_lift = 200.0;               /* m/s^2; limit on the reaching law's
+                                                            acceleration (lift) */
+  const double control_a_max_rotation = 200.0;           /* rad/s^2; limit on the reaching law's
+                                                            acceleration (rotation) */
+  const double c0 = 0.0025000000000000005;               /* control_delta^2 */
+  const double c1 = -200.0;                              /* -control_a_max_lift */
+  const double c2 = -200.0;                              /* -control_a_max_rotation */
+  const double H_lift_lift = 52.0;                       /* (mechanism_m3 + mechanism_m2) +
+                                                            drive_m_l */
+  const double c3 = 29.6;                                /* mechanism_m3 mechanism_L3 */
+  const double G_lift = 490.0;                           /* (mechanism_g mechanism_m3) +
+                                                            (mechanism_g mechanism_m2) */
+  const double H_rotation_rotation = 29.215333333333334; /* (mechanism_J + ((mechanism_m3
+                                                            mechanism_L3) mechanism_L3)) +
+                                                            drive_I */
+  const double c4 = 290.08;                              /* (mechanism_g mechanism_m3)
+                                                            mechanism_L3 */
 
   /* tracking error and sliding variable, (22), E3 */
   const double dq1d_lift = reference->dq1d_lift;
@@ -187,10 +195,11 @@ static int springline_evaluate_control(
   const double u_e_lift = a_lift - dsurface_lift;
   const double ddq1d_lift = reference->ddq1d_lift;
   const double ddq_lift = ddq1d_lift - u_e_lift;
-  const double a94 = c3 * ddq_lift;
-  double sin_q1_rotation, cos_q1_rotation;
+  const double a94 = H_lift_lift * ddq_lift;
+  double sin_q1_rotation;
+  double cos_q1_rotation;
   sl_sincos(q1_rotation, &sin_q1_rotation, &cos_q1_rotation);
-  const double H_rotation_lift = c4 * cos_q1_rotation;
+  const double H_rotation_lift = c3 * cos_q1_rotation;
   const double u_e_rotation = a_rotation - dsurface_rotation;
   const double ddq1d_rotation = reference->ddq1d_rotation;
   const double ddq_rotation = ddq1d_rotation - u_e_rotation;
@@ -198,13 +207,13 @@ static int springline_evaluate_control(
   const double a100 = a94 + a99;
   const double a101 = dq1_rotation * dq1_rotation;
   const double a103 = a101 * sin_q1_rotation;
-  const double a104 = c4 * a103;
+  const double a104 = c3 * a103;
   const double a105 = a100 - a104;
-  const double u_s_lift = a105 + c5;
+  const double u_s_lift = a105 + G_lift;
   const double a107 = H_rotation_lift * ddq_lift;
-  const double a108 = c6 * ddq_rotation;
+  const double a108 = H_rotation_rotation * ddq_rotation;
   const double a109 = a107 + a108;
-  const double G_rotation = c7 * cos_q1_rotation;
+  const double G_rotation = c4 * cos_q1_rotation;
   const double u_s_rotation = a109 + G_rotation;
 
   /* fast control, (33) */
@@ -246,22 +255,25 @@ static void springline_evaluate_plant(
     const springline_command *command,
     springline_real *dx) {
   (void)controller, (void)base;
-  const double plant_g = 9.8;           /* m/s^2; gravity */
-  const double plant_k_s2 = 2000000.0;  /* N/m; stiffness of the lift spring */
-  const double plant_k_s3 = 20000.0;    /* N m/rad; stiffness of the rotation spring */
-  const double c0 = 0.5;                /* 1 / plant_m_l */
-  const double c1 = 100.0;              /* 1 / plant_I */
-  const double c2 = 25.0;               /* (plant_m3 plant_L1) + (plant_L1 plant_m2) */
-  const double c3 = 50.0;               /* plant_m3 + plant_m2 */
-  const double c4 = 29.6;               /* plant_m3 plant_L3 */
-  const double c5 = 59.2;               /* 2 (plant_m3 plant_L3) */
-  const double c6 = 0.02;               /* 1 / (plant_m3 + plant_m2) */
-  const double c7 = 29.205333333333332; /* plant_J + ((plant_m3 plant_L3) plant_L3) */
-  const double c8 = 21.904;             /* (plant_m3 plant_L3) plant_L3 */
-  const double c9 = 14.8;               /* (plant_m3 plant_L3) plant_L1 */
-  const double c10 = 43.808;            /* 2 ((plant_m3 plant_L3) plant_L3) */
+  const double plant_g = 9.8;                             /* m/s^2; gravity */
+  const double plant_k_s2 = 2000000.0;                    /* N/m; stiffness of the lift spring */
+  const double plant_k_s3 = 20000.0;                      /* N m/rad; stiffness of the rotation
+                                                             spring */
+  const double c0 = 0.5;                                  /* 1 / plant_m_l */
+  const double c1 = 100.0;                                /* 1 / plant_I */
+  const double c2 = 29.6;                                 /* plant_m3 plant_L3 */
+  const double c3 = 25.0;                                 /* (plant_m3 plant_L1) + (plant_L1
+                                                             plant_m2) */
+  const double M1_lift_lift = 50.0;                       /* plant_m3 + plant_m2 */
+  const double c4 = 59.2;                                 /* 2 (plant_m3 plant_L3) */
+  const double M1_rotation_rotation = 29.205333333333332; /* plant_J + ((plant_m3 plant_L3)
+                                                             plant_L3) */
+  const double c5 = 21.904;                               /* (plant_m3 plant_L3) plant_L3 */
+  const double c6 = 14.8;                                 /* (plant_m3 plant_L3) plant_L1 */
+  const double c7 = 43.808;                               /* 2 ((plant_m3 plant_L3) plant_L3) */
+  const double c8 = 0.02;                                 /* 1 / (plant_m3 + plant_m2) */
 
-  /* springs and motors, (1) */
+  /* springs, (1) */
   const double q2_lift = x[4];
   const double q1_lift = x[0];
   const double a0 = q2_lift - q1_lift;
@@ -270,6 +282,8 @@ static void springline_evaluate_plant(
   const double q1_rotation = x[1];
   const double a2 = q2_rotation - q1_rotation;
   const double z_rotation = plant_k_s3 * a2;
+
+  /* motors, (1) */
   const double u_lift = command->U_lift;
   const double a4 = u_lift - z_lift;
   const double ddq2_lift = a4 * c0;
@@ -277,113 +291,120 @@ static void springline_evaluate_plant(
   const double a6 = u_rotation - z_rotation;
   const double ddq2_rotation = a6 * c1;
 
-  /* arm on its moving base, (1) */
-  double sin_q1_rotation, cos_q1_rotation;
+  /* mass matrix of the arm, (1) */
+  double sin_q1_rotation;
+  double cos_q1_rotation;
   sl_sincos(q1_rotation, &sin_q1_rotation, &cos_q1_rotation);
+  const double M1_rotation_lift = c2 * cos_q1_rotation;
+
+  /* Coriolis, centrifugal and gravity forces less what the moving base adds, (1) */
   const double dq1_rotation = x[3];
-  const double a9 = dq1_rotation * dq1_rotation;
-  const double a11 = a9 * sin_q1_rotation;
+  const double a10 = dq1_rotation * dq1_rotation;
+  const double a12 = a10 * sin_q1_rotation;
   const double theta_1x = base->theta_1x;
-  double sin_theta_1x, cos_theta_1x;
+  double sin_theta_1x;
+  double cos_theta_1x;
   sl_sincos(theta_1x, &sin_theta_1x, &cos_theta_1x);
   const double dd_theta_1z = base->dd_theta_1z;
-  const double a13 = cos_theta_1x * dd_theta_1z;
+  const double a14 = cos_theta_1x * dd_theta_1z;
   const double d_theta_1x = base->d_theta_1x;
-  const double a15 = sin_theta_1x * d_theta_1x;
+  const double a16 = sin_theta_1x * d_theta_1x;
   const double d_theta_1z = base->d_theta_1z;
-  const double a16 = d_theta_1z * a15;
-  const double a17 = a13 - a16;
-  const double a18 = c2 * a17;
+  const double a17 = d_theta_1z * a16;
+  const double a18 = a14 - a17;
+  const double a19 = c3 * a18;
   const double theta_1z = base->theta_1z;
-  double sin_theta_1z, cos_theta_1z;
+  double sin_theta_1z;
+  double cos_theta_1z;
   sl_sincos(theta_1z, &sin_theta_1z, &cos_theta_1z);
-  const double a20 = cos_theta_1z * cos_theta_1x;
+  const double a21 = cos_theta_1z * cos_theta_1x;
   const double dd_y_r1 = base->dd_y_r1;
-  const double a21 = plant_g + dd_y_r1;
-  const double a22 = a20 * a21;
-  const double a23 = c3 * a22;
-  const double a24 = a18 + a23;
-  const double a25 = d_theta_1z * sin_theta_1x;
-  const double a26 = d_theta_1x * a25;
-  const double a27 = c2 * a26;
-  const double a28 = a24 + a27;
-  const double a29 = d_theta_1z * cos_theta_1x;
-  const double a30 = a29 * a29;
-  const double a31 = c4 * a30;
-  const double a32 = d_theta_1x * d_theta_1x;
-  const double a33 = c4 * a32;
-  const double a34 = a31 + a33;
-  const double a35 = a34 * sin_q1_rotation;
-  const double a36 = a28 - a35;
-  const double a37 = c4 * a17;
-  const double a38 = c4 * a26;
-  const double a39 = a37 + a38;
-  const double a40 = a39 * cos_q1_rotation;
-  const double a41 = a36 + a40;
-  const double a42 = c3 * a30;
-  const double a43 = c3 * a32;
-  const double a44 = a42 + a43;
-  const double a45 = a44 * q1_lift;
-  const double a46 = a41 - a45;
-  const double a47 = c5 * a29;
-  const double a48 = dq1_rotation * sin_q1_rotation;
-  const double a49 = a47 * a48;
-  const double a50 = a46 - a49;
-  const double a51 = c4 * a11;
-  const double C_dq1_G_S_lift = a50 - a51;
-  const double a53 = z_lift - C_dq1_G_S_lift;
-  const double a54 = a53 * c6;
-  const double M1_rotation_lift = c4 * cos_q1_rotation;
-  const double a56 = M1_rotation_lift * c6;
-  const double a57 = c7 * a17;
-  const double a58 = c8 * a26;
-  const double a59 = a57 - a58;
-  const double a60 = c9 * a30;
-  const double a62 = sin_theta_1z * a21;
-  const double a63 = c4 * a62;
-  const double a64 = a60 - a63;
-  const double a65 = a25 * a25;
-  const double a66 = c9 * a65;
-  const double a67 = a64 + a66;
-  const double a68 = a67 * sin_q1_rotation;
-  const double a69 = a59 + a68;
-  const double a70 = c9 * a17;
-  const double a71 = c4 * a22;
-  const double a72 = a70 + a71;
-  const double a73 = c9 * a26;
-  const double a74 = a72 + a73;
-  const double a75 = a74 * cos_q1_rotation;
-  const double a76 = a69 + a75;
-  const double a77 = c8 * a65;
-  const double a78 = c8 * a32;
-  const double a79 = a77 - a78;
-  const double a80 = sin_q1_rotation * cos_q1_rotation;
-  const double a81 = a79 * a80;
-  const double a82 = a76 + a81;
-  const double a83 = a37 - a38;
-  const double a84 = sin_q1_rotation * q1_lift;
-  const double a85 = a83 * a84;
-  const double a86 = a82 + a85;
+  const double a22 = plant_g + dd_y_r1;
+  const double a23 = a21 * a22;
+  const double a24 = M1_lift_lift * a23;
+  const double a25 = a19 + a24;
+  const double a26 = d_theta_1z * sin_theta_1x;
+  const double a27 = d_theta_1x * a26;
+  const double a28 = c3 * a27;
+  const double a29 = a25 + a28;
+  const double a30 = d_theta_1z * cos_theta_1x;
+  const double a31 = a30 * a30;
+  const double a32 = c2 * a31;
+  const double a33 = d_theta_1x * d_theta_1x;
+  const double a34 = c2 * a33;
+  const double a35 = a32 + a34;
+  const double a36 = a35 * sin_q1_rotation;
+  const double a37 = a29 - a36;
+  const double a38 = c2 * a18;
+  const double a39 = c2 * a27;
+  const double a40 = a38 + a39;
+  const double a41 = a40 * cos_q1_rotation;
+  const double a42 = a37 + a41;
+  const double a43 = M1_lift_lift * a31;
+  const double a44 = M1_lift_lift * a33;
+  const double a45 = a43 + a44;
+  const double a46 = a45 * q1_lift;
+  const double a47 = a42 - a46;
+  const double a48 = c4 * a30;
+  const double a49 = dq1_rotation * sin_q1_rotation;
+  const double a50 = a48 * a49;
+  const double a51 = a47 - a50;
+  const double a52 = c2 * a12;
+  const double C_dq1_G_S_lift = a51 - a52;
+  const double a54 = M1_rotation_rotation * a18;
+  const double a55 = c5 * a27;
+  const double a56 = a54 - a55;
+  const double a57 = c6 * a31;
+  const double a59 = sin_theta_1z * a22;
+  const double a60 = c2 * a59;
+  const double a61 = a57 - a60;
+  const double a62 = a26 * a26;
+  const double a63 = c6 * a62;
+  const double a64 = a61 + a63;
+  const double a65 = a64 * sin_q1_rotation;
+  const double a66 = a56 + a65;
+  const double a67 = c6 * a18;
+  const double a68 = c2 * a23;
+  const double a69 = a67 + a68;
+  const double a70 = c6 * a27;
+  const double a71 = a69 + a70;
+  const double a72 = a71 * cos_q1_rotation;
+  const double a73 = a66 + a72;
+  const double a74 = c5 * a62;
+  const double a75 = c5 * a33;
+  const double a76 = a74 - a75;
+  const double a77 = sin_q1_rotation * cos_q1_rotation;
+  const double a78 = a76 * a77;
+  const double a79 = a73 + a78;
+  const double a80 = a38 - a39;
+  const double a81 = sin_q1_rotation * q1_lift;
+  const double a82 = a80 * a81;
+  const double a83 = a79 + a82;
   const double dq1_lift = x[2];
-  const double a87 = sin_q1_rotation * dq1_lift;
-  const double a88 = a47 * a87;
-  const double a89 = a86 + a88;
-  const double a90 = cos_q1_rotation * q1_lift;
-  const double a91 = a34 * a90;
-  const double a92 = a89 - a91;
-  const double a93 = c10 * a26;
-  const double a94 = cos_q1_rotation * cos_q1_rotation;
-  const double a95 = a93 * a94;
-  const double C_dq1_G_S_rotation = a92 + a95;
+  const double a84 = sin_q1_rotation * dq1_lift;
+  const double a85 = a48 * a84;
+  const double a86 = a83 + a85;
+  const double a87 = cos_q1_rotation * q1_lift;
+  const double a88 = a35 * a87;
+  const double a89 = a86 - a88;
+  const double a90 = c7 * a27;
+  const double a91 = cos_q1_rotation * cos_q1_rotation;
+  const double a92 = a90 * a91;
+  const double C_dq1_G_S_rotation = a89 + a92;
+
+  /* accelerations of the joints, (1) */
+  const double a94 = z_lift - C_dq1_G_S_lift;
+  const double a95 = a94 * c8;
+  const double a96 = M1_rotation_lift * c8;
   const double a97 = z_rotation - C_dq1_G_S_rotation;
-  const double a98 = a56 * a53;
+  const double a98 = a96 * a94;
   const double a99 = a97 - a98;
-  const double a100 = M1_rotation_lift * a56;
-  const double a101 = c7 - a100;
+  const double a100 = M1_rotation_lift * a96;
+  const double a101 = M1_rotation_rotation - a100;
   const double a102 = 1.0 / a101;
   const double ddq1_rotation = a99 * a102;
-  const double a104 = a56 * ddq1_rotation;
-  const double ddq1_lift = a54 - a104;
+  const double a104 = a96 * ddq1_rotation;
+  const double ddq1_lift = a95 - a104;
 
   dx[0] = dq1_lift;
   dx[1] = dq1_rotation;
@@ -581,8 +602,8 @@ int springline_plant_step(
     const double gain_0 = 0.16666666666666666 * step;
     const double gain_1 = 0.5 * step;
     for (i = 0; i < 8; i++) {
-      next[i] = x[i] + gain_0 * slope[i];
-      at[i] = x[i] + gain_1 * slope[i];
+      next[i] = x[i] + (gain_0 * slope[i]);
+      at[i] = x[i] + (gain_1 * slope[i]);
     }
   }
   /* stage 2 of 4 */
@@ -591,8 +612,8 @@ int springline_plant_step(
     const double gain_0 = 0.3333333333333333 * step;
     const double gain_1 = 0.5 * step;
     for (i = 0; i < 8; i++) {
-      next[i] = next[i] + gain_0 * slope[i];
-      at[i] = x[i] + gain_1 * slope[i];
+      next[i] = next[i] + (gain_0 * slope[i]);
+      at[i] = x[i] + (gain_1 * slope[i]);
     }
   }
   /* stage 3 of 4 */
@@ -601,8 +622,8 @@ int springline_plant_step(
     const double gain_0 = 0.3333333333333333 * step;
     const double gain_1 = 1.0 * step;
     for (i = 0; i < 8; i++) {
-      next[i] = next[i] + gain_0 * slope[i];
-      at[i] = x[i] + gain_1 * slope[i];
+      next[i] = next[i] + (gain_0 * slope[i]);
+      at[i] = x[i] + (gain_1 * slope[i]);
     }
   }
   /* stage 4 of 4 */
@@ -610,7 +631,7 @@ int springline_plant_step(
   {
     const double gain_0 = 0.16666666666666666 * step;
     for (i = 0; i < 8; i++) {
-      next[i] = next[i] + gain_0 * slope[i];
+      next[i] = next[i] + (gain_0 * slope[i]);
     }
   }
   if (!springline_state_is_finite(next)) return SPRINGLINE_DIVERGED;
@@ -691,13 +712,15 @@ int springline_signals(
     const double c3 = 2.4674011002723395;                         /* reference_rotation_0_omega^2 */
     const double a0 = reference_lift_0_omega * t;
     const double a1 = a0 + reference_lift_0_phase;
-    double a2, a10;
+    double a2;
+    double a10;
     sl_sincos(a1, &a2, &a10);
     const double a3 = reference_lift_0_amplitude * a2;
     const double q1d_lift = reference_lift_offset + a3;
     const double a5 = reference_rotation_0_omega * t;
     const double a6 = a5 + reference_rotation_0_phase;
-    double a7, a12;
+    double a7;
+    double a12;
     sl_sincos(a6, &a7, &a12);
     const double a8 = reference_rotation_0_amplitude * a7;
     const double q1d_rotation = reference_rotation_offset + a8;

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from springline.codegen.kernel import Engine, KernelOptions, KernelSpec, LoopSettings, Runs, lanes, toolchain
 from springline.codegen.kernel.compiled import compile_kernel
 from springline.codegen.kernel.source import print_kernel
-from springline.codegen.program import LoopGraph, Program, UnprintableOperation
+from springline.codegen.program import LoopGraph, Program
 from springline.model.symbolic import as_written
 from springline.model.terms import Term
 

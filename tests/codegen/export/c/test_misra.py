@@ -14,7 +14,7 @@ from springline.codegen.export.c.tree import generate_files
 from springline.codegen.files.manifest import write_tree
 from springline.runner.scenario import load_scenario
 
-PAGE = Path(__file__).parents[2] / "docs" / "embedding.md"
+PAGE = Path(__file__).parents[4] / "docs" / "embedding.md"
 ROW = re.compile(r"^\| (\d+\.\d+) \| (\d+) \| (.+) \|$", re.MULTILINE)
 # What <float.h> and <stdint.h> say, which cppcheck does not read.
 TARGET = (
