@@ -193,8 +193,10 @@ class TypedInterface:
         return k not in self.export.tunable and math.isinf(self.export.values[k])
 
     def _parameter(self, key: str) -> str:
-        """C of a parameter's value inside a function that is given the controller."""
+        """C of a parameter's value behind the statements of the control: its name where they define it."""
         k = [slot.key for slot in self.export.slots].index(key)
+        if self.export.slots[k].symbol in self.bodies["control"].constants:
+            return self.export.slots[k].symbol
         if k in self.export.tunable:
             return f"controller->config.parameters.{self.export.slots[k].symbol}"
         return literal(self.export.values[k], self.export.real)

@@ -93,6 +93,12 @@ def test_a_body_tells_the_names_of_its_constants() -> None:
     assert body.constants == {line.split()[2] for line in body.lines if re.match(r"const \w+ \w+ = .*/\*", line)}
 
 
+def test_flags_of_limits_name_the_limit() -> None:
+    for joint in ("lift", "rotation"):
+        limit, law = f"control_a_max_{joint}", f"dsigma_{joint}"
+        assert f"{law} < -{limit} || {law} > {limit};" in " ".join(source().split())
+
+
 def test_what_comes_from_several_says_how_to_the_last_bit() -> None:
     scenario = load_scenario("paper/nominal")
     values = {slot.symbol: value for slot, value in zip(scenario.system().slots, scenario.values(), strict=True)}
