@@ -240,8 +240,10 @@ static int springline_evaluate_control(
   diagnostics->sigma_rotation = sigma_rotation;
   diagnostics->saturated_lift = 0;
   diagnostics->saturated_rotation = 0;
-  diagnostics->a_limited_lift = dsigma_lift < -200.0 || dsigma_lift > 200.0;
-  diagnostics->a_limited_rotation = dsigma_rotation < -200.0 || dsigma_rotation > 200.0;
+  diagnostics->a_limited_lift = dsigma_lift < -control_a_max_lift || dsigma_lift >
+      control_a_max_lift;
+  diagnostics->a_limited_rotation = dsigma_rotation < -control_a_max_rotation || dsigma_rotation >
+      control_a_max_rotation;
   return
       springline_is_finite(dsigma_lift) &&
       springline_is_finite(dsigma_rotation);
