@@ -82,10 +82,13 @@ def commands(text: str) -> list[str]:
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with what the pages take for granted: a user's scenarios, a checkout's generated/."""
+    """A folder with what the pages take for granted: a user's scenarios, a checkout's generated/, an example."""
     for name in ("my_arm.toml", "my_scenario.toml"):
         (tmp_path / name).touch()
     shutil.copytree(ROOT / "generated", tmp_path / "generated")
+    for path in (ROOT / "examples/own_mechanism").iterdir():
+        if path.is_file():
+            shutil.copy(path, tmp_path)
     monkeypatch.chdir(tmp_path)
     shorten(monkeypatch)
     return tmp_path
