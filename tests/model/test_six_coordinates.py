@@ -181,8 +181,8 @@ def test_against_sympy(mounted, inertial_of_six, case, rng):
     moved = inertial_of_six.left_side(q, dq, ddq, *base, values)
     disturbance = mounted("base_disturbance", *base, q, dq, p=p)
     scale = scale_of(q, values, base)
-    assert np.max(np.abs(level - at_rest) / scale) < 1e-14
-    assert np.max(np.abs(disturbance - (at_rest - moved)) / scale) < 1e-14
+    assert np.max(np.abs(level - at_rest) / scale) < 1e-15
+    assert np.max(np.abs(disturbance - (at_rest - moved)) / scale) < 1e-15
 
 
 def test_the_moving_plant_is_what_its_parts_say(mounted, case, rng):
@@ -216,7 +216,7 @@ def test_power_balance(mounted, inertial_of_six, case, rng):
     change = inertial_of_six.power(*motion) + stored
     scale = np.abs(supplied) + np.abs(change) + np.sum(np.abs(spring * dq), axis=0) + 1e3
     assert np.median(np.abs(inertial_of_six.base_power(*motion))) > 100.0
-    assert np.max(np.abs(change - supplied) / scale) < 1e-11
+    assert np.max(np.abs(change - supplied) / scale) < 1e-12
 
 
 def test_energy_counts_height_from_the_foot_along_the_real_vertical(mounted, inertial_of_six, case):
