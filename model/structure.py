@@ -31,6 +31,7 @@ class Structure:
     controller     by name; law, log_form and exponents are those of one that has a reaching law
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
     effects        properties of sensors and motors, by name, in the order in which they act
+    friction       damping and friction that there is, names of drive.FRICTION in their order
     initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
                    told; on the reference they start with springs that carry the arm along it
     """
@@ -47,6 +48,7 @@ class Structure:
     integrator: str = "rk4"
     effects: tuple[str, ...] = ()
     controller: str = "terminal_sliding"
+    friction: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,16 @@ from springline.model.control import (
     commanded,
     fast_control,
 )
-from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
+from springline.model.drive import (
+    DRIVES,
+    EPSILON,
+    Drive,
+    DriveKind,
+    diagonal,
+    friction,
+    friction_parameters,
+    static_motor_position,
+)
 from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.lagrange import EquationsOfMotion, equations_of_motion
@@ -108,6 +117,7 @@ class System:
 
         vector = ParameterVector()
         arm, drive = self.mechanism.parameters, self.drive.parameters(self.mechanism)
+        drive = (*drive, *friction_parameters(self.structure.drive, self.structure.friction))
         split = (EPSILON,) if self.structure.drive == "elastic" else ()
         self._nominal = vector.table("mechanism", arm, self.joints)
         self._nominal |= vector.table("drive", (*drive, *split), self.joints)
@@ -186,8 +196,9 @@ class System:
             return ca.vertcat(q, dq)
         stiffness = diagonal(self.mechanism.stiffness, self._plant)
         if self.structure.start == "reference":
+            resistance = friction(self.dq1, self._plant, "link")
             load = ca.substitute(
-                real.mass @ self.ddq1d + real.bias,
+                real.mass @ self.ddq1d + real.bias + (0 if resistance is None else resistance),
                 ca.vertcat(self.w, self.q1, self.dq1),
                 ca.vertcat(self._signal_expressions, q, dq),
             )

@@ -17,7 +17,7 @@ from springline.codegen.kernel import MOST_STEPS
 from springline.codegen.numbers import double
 from springline.model.base import COORDINATES
 from springline.model.control import CONTROLLERS, LARGEST_SURFACE_EXPONENT, LAWS, LogForm
-from springline.model.drive import DRIVES, EPSILON, DriveKind
+from springline.model.drive import DRIVES, EPSILON, DriveKind, friction_parameters
 from springline.model.integrators import INTEGRATORS
 from springline.model.mechanisms import MECHANISMS, Mechanism
 from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
@@ -292,7 +292,7 @@ def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, l
     """
     mechanism = MECHANISMS[name]
     joints = mechanism.joints
-    arm, moving = mechanism.parameters, DRIVES[drive].parameters(mechanism)
+    arm, moving = mechanism.parameters, _drive_parameters(drive, mechanism)
     named = (Annotated[str, door("mechanism", MECHANISMS)], name)
     shared = _numbers(control_parameters(mechanism, drive), joints)
     own = own_control_tables(Structure(name, law, drive=drive, controller=controller))
@@ -319,7 +319,7 @@ def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, l
             "simulation": Simulation,
         },
         kinds={
-            "drive": {kind: _drive_section(kind, mechanism) for kind in DRIVES},
+            "drive": {kind: _drive_section(cast(DriveKind, kind), mechanism) for kind in DRIVES},
             "reference": {
                 "sine": _reference_sines(mechanism),
                 "polynomial": _reference_polynomials(mechanism),
@@ -340,9 +340,14 @@ def _own_tables(own: Mapping[str, Iterable[Parameter]], joints: Sequence[Joint])
     return {name: (made, made.model_validate({})) for name, made in sections.items()}
 
 
-def _drive_section(kind: str, mechanism: Mechanism) -> type[Section]:
+def _drive_parameters(kind: DriveKind, mechanism: Mechanism) -> tuple[Parameter, ...]:
+    """All numbers that a drive of one kind may have and the plant too, whether or not they are zero."""
+    return (*DRIVES[kind].parameters(mechanism), *friction_parameters(kind))
+
+
+def _drive_section(kind: DriveKind, mechanism: Mechanism) -> type[Section]:
     """[drive] of one kind; only springs split the system into a slow and a fast one."""
-    parameters = DRIVES[kind].parameters(mechanism)
+    parameters = _drive_parameters(kind, mechanism)
     split = (EPSILON,) if kind == "elastic" else ()
     return _section("drive", {"kind": (Literal[kind], kind), **_numbers((*parameters, *split), mechanism.joints)})
 
