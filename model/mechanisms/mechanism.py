@@ -18,6 +18,12 @@ from springline.model.signals import SineTerm
 # no small share, for the slow law eats much of it (docs/paper.md, E13).
 _FAST_DAMPING = 0.5
 
+TAKEN = frozenset({
+    *("name", "limits", "kind", "epsilon", "spring_damping", "link_viscous", "link_coulomb", "motor_viscous"),
+    *("motor_coulomb", "coulomb_velocity"),
+})  # fmt: skip
+"""Keys that [mechanism], [drive] and [plant] have whatever the mechanism is."""
+
 
 class Mechanism(ABC):
     """An arm of n joints, n >= 1. A subclass says at least its joints, parameters, motors, springs and two energies.
@@ -31,6 +37,7 @@ class Mechanism(ABC):
     reference_terms   sine terms of the desired trajectory, a tuple per joint; () for none
     start_position    initial joint coordinates; () for all zero
     start_rate        initial joint rates; () for all zero
+    limits            least and greatest coordinate of each joint, beyond which a run ends; () for none
     control_defaults  what the controller's parameters are for this arm, by name: a number, or one per joint
     source            where its equations and numbers come from, a sentence; "" where there is nothing to cite
     sampling          what sample periods and delays its loop was seen to bear, Markdown for those who embed it; ""
@@ -46,6 +53,7 @@ class Mechanism(ABC):
     reference_terms: ClassVar[tuple[tuple[SineTerm, ...], ...]] = ()
     start_position: ClassVar[tuple[float, ...]] = ()
     start_rate: ClassVar[tuple[float, ...]] = ()
+    limits: ClassVar[tuple[tuple[float, float], ...]] = ()
     control_defaults: ClassVar[Mapping[str, float | tuple[float, ...]]] = {}
     source: ClassVar[str] = ""
     sampling: ClassVar[str] = ""
@@ -107,6 +115,13 @@ def check_mechanism(mechanism: Mechanism) -> None:
         expect_parameters(owner, what, declared, () if declared is None else joints)
         names += [item.name for item in getattr(mechanism, what)]
     expect_names(owner, "parameters, motor_inertia and stiffness", names)
+    taken = [name for name in names if name in TAKEN]
+    if taken:
+        raise ValueError(f"{owner}: parameters, motor_inertia and stiffness: {taken[0]!r} is a key of every mechanism")
+    if mechanism.limits and not (
+        len(mechanism.limits) == len(joints) and all(len(pair) == 2 and pair[0] < pair[1] for pair in mechanism.limits)
+    ):
+        raise ValueError(f"{owner}: limits: expected () or a pair low < high per joint, got {mechanism.limits!r}")
     if "g" not in {item.name for item in mechanism.parameters}:
         raise ValueError(f"{owner}: parameters: expected one called g, the gravity in m/s^2")
     for what in ("motor_inertia", "stiffness"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -118,6 +119,12 @@ class Scenario:
     def bound(self) -> float:
         """Largest |x_i| before a run is stopped, SI units."""
         return float(self._simulation["bound"])
+
+    @property
+    def limits(self) -> tuple[tuple[float, float], ...]:
+        """Least and greatest coordinate of each joint before a run is stopped; () where there are none."""
+        pairs = tuple((float(low), float(high)) for low, high in self.document["mechanism"].get("limits", ()))
+        return pairs if any(math.isfinite(value) for pair in pairs for value in pair) else ()
 
     @property
     def response_band(self) -> float:

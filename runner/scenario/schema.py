@@ -188,6 +188,29 @@ def several(item: Leaf) -> Leaf:
     return Leaf(expected, check)
 
 
+def joint_limits(joints: Sequence[Joint]) -> Leaf:
+    """A pair low < high for each joint, either of them infinite where there is no limit."""
+    names = ", ".join(f"{joint.name} [{joint.unit}]" for joint in joints)
+    expected = f"a pair [low, high] with low < high for each joint ({names}), inf for none"
+
+    def pair(i: int, given: object) -> list[float]:
+        low_high = f"expected [low, high] with low < high [{joints[i].unit}]"
+        try:
+            low, high = map(double, given if isinstance(given, list) else ())
+        except (TypeError, ValueError):
+            raise _wrong(low_high, at=(i,), given=given) from None
+        if not low < high:
+            raise _wrong(low_high, at=(i,), given=given)
+        return [low, high]
+
+    def check(value: object) -> list[list[float]]:
+        if not isinstance(value, list) or len(value) != len(joints):
+            raise _wrong(f"expected {expected}")
+        return [pair(i, given) for i, given in enumerate(value)]
+
+    return Leaf(expected, check)
+
+
 def motor_start(given: Leaf) -> Leaf:
     """How the springs stand at t = 0, by name or as motor coordinates."""
     named = choice("start of the motors", MOTOR_STARTS)
@@ -294,6 +317,7 @@ def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, l
     joints = mechanism.joints
     arm, moving = mechanism.parameters, _drive_parameters(drive, mechanism)
     named = (Annotated[str, door("mechanism", MECHANISMS)], name)
+    limits = (Annotated[Any, joint_limits(joints)], [list(pair) for pair in mechanism.limits] or None)
     shared = _numbers(control_parameters(mechanism, drive), joints)
     own = own_control_tables(Structure(name, law, drive=drive, controller=controller))
     for taken in own:
@@ -312,7 +336,7 @@ def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, l
     sines: dict[str, Any] = {key: (_terms(unit), []) for key, unit in coordinates.items()}
     return Schema(
         sections={
-            "mechanism": _section("mechanism", {"name": named, **_numbers(arm, joints)}),
+            "mechanism": _section("mechanism", {"name": named, "limits": limits, **_numbers(arm, joints)}),
             "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *moving)}),
             "control": _section("control", shared | _own_tables(own, joints), ControlStructure),
             "initial": _section("initial", initial),
