@@ -89,6 +89,11 @@ def diagonal(parameters: tuple[Parameter, ...], p: Values) -> ca.SX:
     return ca.vertcat(*(p[item.name] for item in parameters))
 
 
+def _pushed(force: ca.SX, other: ca.SX | None) -> ca.SX:
+    """A force and another one beside it, if there is one."""
+    return force if other is None else force + other
+
+
 def _resisted(force: ca.SX, name: str, against: ca.SX | None) -> ca.SX:
     """A force less what acts against it, which is called `name`."""
     return force if against is None else force - named(name, against)
@@ -108,8 +113,10 @@ class Drive(Protocol):
     def parameters(self, mechanism: Mechanism) -> tuple[Parameter, ...]:
         """Parameters of the [drive] table that the plant always has too: `friction_parameters` has the others."""
 
-    def plant(self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values) -> ca.SX:
-        """dx/dt under the motor forces u (n x 1, N or N m)."""
+    def plant(
+        self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values, force: ca.SX | None = None
+    ) -> ca.SX:
+        """dx/dt under the motor forces u and, where there is one, a force on the links (n x 1 each, N or N m)."""
 
     def energy(self, x: ca.SX, mechanism: Mechanism, p: Values) -> ca.SX:
         """Energy of motors and springs, J."""
@@ -129,7 +136,9 @@ class Elastic:
         """Motor inertia and stiffness."""
         return (*mechanism.motor_inertia, *mechanism.stiffness)
 
-    def plant(self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values) -> ca.SX:
+    def plant(
+        self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values, force: ca.SX | None = None
+    ) -> ca.SX:
         """dx/dt (4n x 1), equation (1)."""
         q1, dq1, q2, dq2 = ca.vertsplit(x, x.numel() // 4)
         with section("springs and motors", "(1)"):
@@ -139,7 +148,7 @@ class Elastic:
             motors = named("ddq2", over(driven, diagonal(mechanism.motor_inertia, p)))
         with section("arm on its moving base", "(1)"):
             named("M1", link.mass), named("C_dq1_G_S", link.bias)
-            pulled = _resisted(z - link.bias, "link_friction", friction(dq1, p, "link"))
+            pulled = _resisted(_pushed(z - link.bias, force), "link_friction", friction(dq1, p, "link"))
             joints = named("ddq1", solve_spd(link.mass, pulled))
         return ca.vertcat(dq1, joints, dq2, motors)
 
@@ -160,12 +169,15 @@ class Rigid:
         """Motor inertia."""
         return mechanism.motor_inertia
 
-    def plant(self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values) -> ca.SX:
+    def plant(
+        self, x: ca.SX, u: ca.SX, link: EquationsOfMotion, mechanism: Mechanism, p: Values, force: ca.SX | None = None
+    ) -> ca.SX:
         """dx/dt (2n x 1): equation (4) with U in place of its slow part."""
         _, dq1 = ca.vertsplit(x, x.numel() // 2)
         with section("arm on its moving base, motors on its joints", "(4)"):
             mass = named("H", slow_mass(link.mass, diagonal(mechanism.motor_inertia, p)))
-            driven = _resisted(u - named("C_dq1_G_S", link.bias), "friction", friction(dq1, p, "link", "motor"))
+            driven = _pushed(u - named("C_dq1_G_S", link.bias), force)
+            driven = _resisted(driven, "friction", friction(dq1, p, "link", "motor"))
             joints = named("ddq1", solve_spd(mass, driven))
         return ca.vertcat(dq1, joints)
 

@@ -101,6 +101,9 @@ DB = Quantity("d_", r"\dot b", "{q}/s", "rate of the base", per="base")
 DDB = Quantity("dd_", r"\ddot b", "{q}/s^2", "acceleration of the base", per="base")
 BASE = (B, DB, DDB)
 
+# The links
+DISTURBANCE = Quantity("disturbance", "F_d", "{F}", "disturbance force on the link, positive along +q1")
+
 # The controller
 U = Quantity("U", "U", "{F}", "command to the motor")
 E = Quantity("e", "e", "{q}", "tracking error")

@@ -1,4 +1,4 @@
-"""Symbols of reference and base motion: parameters where they are formulas, data where they are tables."""
+"""Symbols of reference, base motion and disturbance: parameters where they are formulas, data where they are tables."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from springline.model.parameters import ParameterVector
 from springline.model.signals import CONSTANT_ZERO, Signal
 from springline.model.structure import SignalShape, TableLayout
 
-SignalTableName = Literal["reference", "base_motion"]
+SignalTableName = Literal["reference", "base_motion", "disturbance"]
 
 
 class SignalSymbols:
@@ -40,7 +40,7 @@ class SignalSymbols:
         coordinates: list[tuple[str, str]],
     ) -> list[Signal]:
         """Expressions of one vector signal; appends its parameters to the vector or its data to d."""
-        if shape.kind == "none":
+        if shape.kind in ("none", "input"):
             return [CONSTANT_ZERO] * len(coordinates)
         if shape.kind == "table":
             return self._table(table, shape, [key for key, _ in coordinates])
@@ -70,9 +70,9 @@ class SignalSymbols:
     def _sines(self, table: str, key: str, unit: str, count: int) -> Signal:
         offset = ca.SX(0)
         dotted = f"{table}.{key}"
-        if table == "reference":
+        if table != "base_motion":
             offset = self._vector.scalar(
-                f"{dotted}.offset", f"{table}_{key}_offset", unit, 0.0, f"offset of the {key} reference"
+                f"{dotted}.offset", f"{table}_{key}_offset", unit, 0.0, f"offset of the {key} {table}"
             )
             dotted += ".terms"
         terms = [

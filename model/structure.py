@@ -8,7 +8,7 @@ from typing import Literal
 from springline.model.control import LogForm, SurfaceExponents
 from springline.model.drive import DriveKind
 
-SignalKind = Literal["none", "sine", "polynomial", "table"]
+SignalKind = Literal["none", "sine", "polynomial", "table", "input"]
 MotorStart = Literal["unloaded", "equilibrium", "given"]
 JointStart = Literal["given", "reference"]
 
@@ -17,6 +17,7 @@ JointStart = Literal["given", "reference"]
 class SignalShape:
     """The shape of a vector signal: its kind, and what it has per coordinate.
 
+    kind   "input": its values come from outside, step by step, and are zero in a simulation
     terms  sine: number of terms; polynomial: number of via points; table: 1 with a column, 0 (zero) without
     """
 
@@ -31,6 +32,7 @@ class Structure:
     controller     by name; law, log_form and exponents are those of one that has a reaching law
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
     effects        properties of sensors and motors, by name, in the order in which they act
+    disturbance    forces on the links, per joint; not even zero where its kind is "none"
     friction       damping and friction that there is, names of drive.FRICTION in their order
     initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
                    told; on the reference they start with springs that carry the arm along it
@@ -49,6 +51,7 @@ class Structure:
     effects: tuple[str, ...] = ()
     controller: str = "terminal_sliding"
     friction: tuple[str, ...] = ()
+    disturbance: SignalShape = SignalShape()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +61,6 @@ class TableLayout:
     channels: indices of the signal's coordinates that have a column, in the order of their coefficients.
     """
 
-    signal: Literal["reference", "base_motion"]
+    signal: Literal["reference", "base_motion", "disturbance"]
     start: int
     channels: tuple[int, ...]

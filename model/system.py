@@ -4,7 +4,8 @@
     paper's controller). Argument order everywhere: what depends on time, x, z, u, p.
 
 Plant and controller have parameters of their own: "plant.*" is the arm that moves, "mechanism.*" and "drive.*" are what
-the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db, ddb] alone.
+the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db, ddb] alone, where a
+disturbance acts with its forces behind them.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ from springline.model.quantities import (
     A_LAW,
     A_LIMITED,
     BASE,
+    DISTURBANCE,
     DQ1,
     DQ2,
     METRICS,
@@ -131,15 +133,21 @@ class System:
         symbols = SignalSymbols(self.t, vector)
         reference = symbols.signal("reference", self.structure.reference, [(j.name, j.unit) for j in self.joints])
         base = symbols.signal("base_motion", self.structure.base_motion, [(c.key, c.unit) for c in COORDINATES])
+        force = symbols.signal("disturbance", self.structure.disturbance, [(j.name, j.force) for j in self.joints])
+        disturbed = self.structure.disturbance.kind != "none"
         self.tables, self.d = symbols.tables, symbols.d
-        self._signal_expressions = ca.vertcat(*signals.stack(reference), *signals.stack(base))
+        self._signal_expressions = ca.vertcat(
+            *signals.stack(reference), *signals.stack(base), *(item.value for item in force if disturbed)
+        )
         self._initial = self._initial_values(vector)
         self.p = vector.sx
         self.slots: tuple[Slot, ...] = tuple(vector.slots)
 
         self.q1d, self.dq1d, self.ddq1d = (ca.SX.sym(item.name, n) for item in REFERENCE)
         self.base = BaseMotion(*(ca.SX.sym(f"{item.name}b", len(COORDINATES)) for item in BASE))
-        self.w = ca.vertcat(self.q1d, self.dq1d, self.ddq1d, self.base.b, self.base.db, self.base.ddb)
+        self.disturbance: ca.SX | None = ca.SX.sym("disturbance", n) if disturbed else None
+        applied = () if self.disturbance is None else (self.disturbance,)
+        self.w = ca.vertcat(self.q1d, self.dq1d, self.ddq1d, self.base.b, self.base.db, self.base.ddb, *applied)
         self._state: dict[Quantity, ca.SX] = {item: ca.SX.sym(item.name, n) for item in self.drive.state}
         self.q1, self.dq1 = self._state[Q1], self._state[DQ1]
         self.x = ca.vertcat(*self._state.values())
@@ -197,8 +205,10 @@ class System:
         stiffness = diagonal(self.mechanism.stiffness, self._plant)
         if self.structure.start == "reference":
             resistance = friction(self.dq1, self._plant, "link")
+            needed = real.mass @ self.ddq1d + real.bias
+            needed = needed if resistance is None else needed + resistance
             load = ca.substitute(
-                real.mass @ self.ddq1d + real.bias + (0 if resistance is None else resistance),
+                needed if self.disturbance is None else needed - self.disturbance,
                 ca.vertcat(self.w, self.q1, self.dq1),
                 ca.vertcat(self._signal_expressions, q, dq),
             )
@@ -236,9 +246,14 @@ class System:
         return tuple(float(state.initial) for state in self.controller_states for _ in state.entries(self.joints))
 
     @property
+    def forces(self) -> tuple[Quantity, ...]:
+        """The disturbance, where there is one."""
+        return () if self.disturbance is None else (DISTURBANCE,)
+
+    @property
     def columns(self) -> tuple[Quantity, ...]:
         """What a trajectory shows, in the order of the loop's rows."""
-        return (T, *self.drive.state, Q1D, E, *self.sliding, U, *self.controller_states, B)
+        return (T, *self.drive.state, Q1D, E, *self.sliding, U, *self.controller_states, B, *self.forces)
 
     @property
     def trajectory(self) -> tuple[Entry, ...]:
@@ -262,7 +277,7 @@ class System:
         signals = self._commanded
         applied = actuated(self.structure.effects, self.u)
         with noted() as terms:
-            dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant)
+            dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant, self.disturbance)
         self._terms["plant"] = tuple(terms)
         return {
             **self._equations(real, signals, dx),
@@ -310,6 +325,8 @@ class System:
         )
         ref_in, ref_names = [self.q1d, self.dq1d, self.ddq1d], ["q1d", "dq1d", "ddq1d"]
         base_in, base_names = [base.b, base.db, base.ddb], ["b", "db", "ddb"]
+        force_in, force_names = ([], []) if self.disturbance is None else ([self.disturbance], [DISTURBANCE.name])
+        plant_in, plant_names = [*base_in, *force_in, x, self.u], [*base_names, *force_names, "x", "u"]
         slow_args, slow_names = [*base_in, q1, dq1, u_slow], [*base_names, "q1", "dq1", "u_s"]
         slow = perturbation.slow_dynamics(u_slow, real.disturbance, real, m2)
         z_in, z_names = ([self.z], ["z"]) if self.controller.states else ([], [])
@@ -320,7 +337,7 @@ class System:
             **function("coriolis", [q1, dq1], [real.coriolis], ["q1", "dq1"], ["C_dq1"]),
             **function("gravity", [q1], [real.gravity], ["q1"], ["G"]),
             **function("base_disturbance", [*base_in, q1, dq1], [real.disturbance], [*base_names, "q1", "dq1"], ["S"]),
-            **function("plant", [*base_in, x, self.u], [dx], [*base_names, "x", "u"], ["dx"]),
+            **function("plant", plant_in, [dx], plant_names, ["dx"]),
             **function("slow_dynamics", slow_args, [slow], slow_names, ["ddq1"]),
         }
         if self.structure.drive == "elastic":
@@ -348,7 +365,7 @@ class System:
         )
         for name, given, given_names in (
             ("control", ins, names),
-            ("plant", [*base_in, x, self.u], [*base_names, "x", "u"]),
+            ("plant", plant_in, plant_names),
         ):
             found = self._terms[name]
             if found:

@@ -147,7 +147,9 @@ class Kernel:
                 coefficients=data.ctypes.data,
             )
         if len(settings.limits) not in (0, self.shape.joints):
-            raise ValueError(f"limits has {len(settings.limits)} pairs, expected one for each of {self.shape.joints} joints")
+            raise ValueError(
+                f"limits has {len(settings.limits)} pairs, expected one for each of {self.shape.joints} joints"
+            )
         limits = np.array(settings.limits, dtype=np.float64)
         rows = settings.rows
         needed, there = 8 * runs * rows * self.shape.columns, memory()

@@ -85,6 +85,7 @@ class _Emitter:
         n = program.system.n
         w = outputs["signals"][0]
         self.observed = [*w[:n], *w[3 * n : 3 * n + len(COORDINATES)]]
+        self.observed += w[len(w) - len(entries(program.system.forces, program.system.joints)) :]
         for wanted in (*self.state_functions.values(), self.observed, outputs["start"][0]):
             self._keep(wanted, Binding.STATE)
         self._keep(list(self.slots[Binding.VARYING]), Binding.VARYING)
@@ -124,7 +125,8 @@ class _Emitter:
             elif node.op is None and kind in ("begin", "first"):
                 names[i] = f"{kind}{k}"
         signal = [f"{q}_{j}" for q in ("q1d", "dq1d", "ddq1d") for j in joints]
-        name(outputs["signals"][0], signal + [f"{d}{c}" for d in ("", "d_", "dd_") for c in base])
+        signal += [f"{d}{c}" for d in ("", "d_", "dd_") for c in base]
+        name(outputs["signals"][0], signal + [entry.name for entry in entries(system.forces, system.joints)])
         for part, label in zip(outputs["control"], ("command", "e", "sigma", "wished", "a_law"), strict=True):
             name(part, [f"{label}_{j}" for j in joints])
         return names

@@ -14,7 +14,7 @@ from springline.codegen.kernel.job import job_header
 from springline.codegen.kernel.spec import KernelOptions, KernelSpec
 from springline.codegen.program import Program, casadi_c, kernel_update
 from springline.model.base import COORDINATES
-from springline.model.quantities import METRICS
+from springline.model.quantities import METRICS, entries
 
 _RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
 
@@ -46,6 +46,7 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
         "SL_NJ": program.system.n,
         "SL_NX": program.size("x") + memory,
         "SL_NB": len(COORDINATES),
+        "SL_NF": len(entries(program.system.forces, program.system.joints)),
         "SL_NP": sizes["p"],
         "SL_NR": sizes["r"],
         "SL_NU": sizes["uniform"],

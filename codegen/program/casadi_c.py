@@ -100,6 +100,7 @@ static inline void kernel_signals(sl_time now, const sl_group *p, const sl_group
   int i;
   for (i = 0; i < SL_NJ; i++) q1d[i][0] = now.varying[i][0];
   for (i = 0; i < SL_NB; i++) b[i][0] = now.varying[3 * SL_NJ + i][0];
+  for (i = 0; i < SL_NF; i++) b[SL_NB + i][0] = now.varying[SL_NUMBER_W - SL_NF + i][0];
 }}
 
 static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{

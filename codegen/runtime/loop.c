@@ -4,7 +4,7 @@
  * A pack is SL_G groups of SL_W lanes, a lane is one run; SL_PACKS packs go through time side by side. "kernel.h" comes
  * from a generator and provides
  *   sizes        SL_W SL_G SL_PACKS; SL_NJ joints, SL_NX states, the last SL_NZ of them the controller's, SL_NB base
- *                coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV (values bound once per run; once per time and the same
+ *                coordinates, SL_NF disturbance forces, SL_NP parameters, SL_NR, SL_NU, SL_NV (values bound once per run; once per time and the same
  *                for all runs; once per time and run), SL_ND, SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller
  *                has a sliding variable) 0 or 1
  *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals
@@ -31,7 +31,7 @@ enum {
   SL_BLOCK = (SL_INSTANTS + SL_W - 1) / SL_W * SL_W, /* instants whose uniform signals are evaluated together */
   SL_NPLANT = SL_NX - SL_NZ,
   SL_NSIGMA = SL_NJ * SL_SLIDING,
-  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB
+  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB + SL_NF
 };
 
 /* ---- signals ------------------------------------------------------------------------------------------- */
@@ -112,7 +112,7 @@ static sl_time time_at(sl_pack *pack, int64_t j, sl_group *varying) {
 /* A trajectory row at step k for each living lane from `lane` to `end`-1. */
 static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) {
   const sl_job *job = pack->job;
-  sl_group q1d[SL_NJ], b[SL_NB];
+  sl_group q1d[SL_NJ], b[SL_NB + SL_NF]; /* forces behind the base */
   int i;
   kernel_signals(now, (const sl_group *)pack->p, (const sl_group *)pack->r, q1d, b);
   for (; lane < end; lane++) {
@@ -127,7 +127,7 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
     for (i = 0; i < SL_NSIGMA; i++) *row++ = lane_of(pack->sigma[i], lane);
     for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->u[i], lane);
     for (i = SL_NPLANT; i < SL_NX; i++) *row++ = lane_of(pack->x[i], lane);
-    for (i = 0; i < SL_NB; i++) *row++ = lane_of(b[i], lane);
+    for (i = 0; i < SL_NB + SL_NF; i++) *row++ = lane_of(b[i], lane);
   }
 }
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from springline.model.base import COORDINATES, BaseCoordinate
 from springline.model.parameters import Joint
-from springline.model.quantities import Q1, Q2, SIGMA, E, Quantity, U
+from springline.model.quantities import DISTURBANCE, Q1, Q2, SIGMA, E, Quantity, U
 from springline.runner.files import units
 from springline.runner.report import (
     LINES,
@@ -42,8 +42,8 @@ _MOVES = 1e-12  # a base coordinate that stays below this stands still
 
 def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
     """The overview of one run, by name: tracking, error, force; sliding if there is a sliding variable, springs if
-    there are springs, base_motion if the base moves. If the run came to its end also steady_state, and error_over_base
-    and error_against_base if the base follows a record.
+    there are springs, base_motion if the base moves, disturbance if forces act on the links. If the run came to its
+    end also steady_state, and error_over_base and error_against_base if the base follows a record.
     """
     run = _Run(scenario, result)
     figures: dict[str, Callable[[_Run], Figure]] = {
@@ -58,6 +58,8 @@ def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
         figures["springs"] = _lines("spring", Q2, less=Q1)
     if run.moving:
         figures["base_motion"] = _base_motion
+    if DISTURBANCE in shown:
+        figures["disturbance"] = _lines("disturbance", DISTURBANCE)
     if run.status == "ok":
         figures["steady_state"] = _steady_state
         if run.moving and scenario.structure().base_motion.kind == "table":

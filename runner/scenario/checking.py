@@ -82,6 +82,7 @@ def resolve(
     units = {
         "reference": {joint.name: joint.unit for joint in MECHANISMS[mechanism].joints},
         "base_motion": {c.key: c.unit for c in COORDINATES},
+        "disturbance": {joint.name: joint.force for joint in MECHANISMS[mechanism].joints},
     }
     tables: list[Spline] = []
     notes: list[str] = []

@@ -162,6 +162,7 @@ class Scenario:
         motor = initial.get("q_motor", "unloaded")
         mechanism = self.registered(self.document["mechanism"]["name"])
         joints = [joint.name for joint in MECHANISMS[mechanism].joints]
+        disturbance = _shape(self.document["disturbance"], joints)
         return Structure(
             mechanism=mechanism,
             law=self.registered(control["law"]),
@@ -174,6 +175,7 @@ class Scenario:
             drive=cast(DriveKind, self.document["drive"]["kind"]),
             start="reference" if initial.get("on_reference") else "given",
             integrator=self.integrator,
+            disturbance=disturbance if disturbance.kind != "none" else SignalShape(),
             friction=tuple(item.name for item in FRICTION if self._has(item.name)),
         )
 
@@ -310,8 +312,8 @@ class Scenario:
     def with_overrides(self, overrides: Mapping[str, object], *, read: bool = True) -> Scenario:
         """This scenario with other values at some dotted keys ("control.mu.0", "plant.m3.scale", …).
 
-        A new kind of reference or base motion, another control mode or mechanism drops what belonged to the old one.
-        Paths count from `folder`. What is going to be changed once more need not `read` its signal files.
+        A new kind of reference, base motion or disturbance, another control mode or mechanism drops what belonged to
+        the old one. Paths count from `folder`. What is going to be changed once more need not `read` its signal files.
         Raises TypeError for what is no mapping of texts, InputError for whatever a file may not hold either.
         """
         expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
@@ -389,7 +391,7 @@ class Scenario:
     def _without_excluded(self, overrides: Mapping[str, object]) -> Document:
         """A copy of the document without what the overrides exclude."""
         document = copy.deepcopy(self.document)
-        for table in ("reference", "base_motion"):
+        for table in ("reference", "base_motion", "disturbance"):
             kind = overrides.get(f"{table}.kind", document[table]["kind"])
             if kind != document[table]["kind"]:
                 document[table] = {"kind": kind}

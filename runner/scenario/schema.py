@@ -272,7 +272,7 @@ BANDS = (("response_band", "response_error"), ("settling_band", "settling_error"
 DEFAULT_BANDS = {"response_band": 0.10, "settling_band": 0.05}
 
 
-class NoMotion(Section):
+class Absent(Section):
     """kind = "none"."""
 
     kind: Literal["none"]
@@ -290,10 +290,10 @@ class Schema:
     kinds: Mapping[str, Mapping[str, type[Section]]]
 
 
-TABLES = ("mechanism", "drive", "plant", "control", "reference", "base_motion", "initial", "simulation")
+TABLES = ("mechanism", "drive", "plant", "control", "reference", "base_motion", "disturbance", "initial", "simulation")
 
 
-DEFAULT_KINDS = {"drive": "elastic", "reference": "sine", "base_motion": "none"}
+DEFAULT_KINDS = {"drive": "elastic", "reference": "sine", "base_motion": "none", "disturbance": "none"}
 """Table -> the kind that it has where none is given."""
 
 
@@ -350,9 +350,14 @@ def schema(name: str, drive: DriveKind, controller: str = _DEFAULT.controller, l
                 "table": _table_section({joint.name: joint.unit for joint in joints}),
             },
             "base_motion": {
-                "none": NoMotion,
+                "none": Absent,
                 "sine": _section("sine", {"kind": (Literal["sine"], ...), **sines}),
                 "table": _table_section(coordinates),
+            },
+            "disturbance": {
+                "none": Absent,
+                "sine": _section("sine", {"kind": (Literal["sine"], ...), **_disturbance_sines(joints)}),
+                "table": _table_section({joint.name: joint.force for joint in joints}),
             },
         },
     )
@@ -427,6 +432,16 @@ def _reference_sines(mechanism: Mechanism) -> type[Section]:
         default = made.model_validate({"offset": mechanism.reference_offset[i], "terms": terms})
         fields[joint.name] = (made, default)
     return _section("sine", fields)
+
+
+def _disturbance_sines(joints: Sequence[Joint]) -> dict[str, Any]:
+    """A constant force and sine terms for each joint; none for one that is not given."""
+    fields: dict[str, Any] = {}
+    for joint in joints:
+        offset = (Annotated[float, number(joint.force)], 0.0)
+        made = _section(joint.name, {"offset": offset, "terms": (_terms(joint.force), [])})
+        fields[joint.name] = (made, made.model_validate({}))
+    return fields
 
 
 def _reference_polynomials(mechanism: Mechanism) -> type[Section]:

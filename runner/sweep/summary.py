@@ -189,7 +189,16 @@ Rows = tuple[list[str], list[list[str]]]
 
 def outcome_rows(summary: Summary) -> Rows:
     """How many runs of each group ended how."""
-    header = ["group", "runs", "ok", "of these chattering", "diverged", "out of bounds", "out of limits", "stopped early"]
+    header = [
+        "group",
+        "runs",
+        "ok",
+        "of these chattering",
+        "diverged",
+        "out of bounds",
+        "out of limits",
+        "stopped early",
+    ]
     rows = []
     for name, counts in summary.outcomes.items():
         total = sum(counts[outcome] for outcome in _OUTCOMES)

@@ -28,7 +28,9 @@ def limited(limits: Any = LIMITS, **changes: Any) -> Any:
     return load_scenario("paper/nominal", SHORT | {"mechanism.limits": limits} | changes)
 
 
-@pytest.mark.parametrize("mode", [{}, {"control.mode": "sampled", "control.period": 1e-3}], ids=["continuous", "sampled"])
+@pytest.mark.parametrize(
+    "mode", [{}, {"control.mode": "sampled", "control.period": 1e-3}], ids=["continuous", "sampled"]
+)
 @pytest.mark.parametrize("engine", ["lanes", "casadi"])
 def test_a_run_ends_before_the_first_state_beyond_a_limit(engine: Any, mode: dict[str, Any]) -> None:
     free = simulate(load_scenario("paper/nominal", SHORT | mode), engine=engine).trajectory
