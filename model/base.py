@@ -46,6 +46,11 @@ class BaseMotion:
         return pitch @ roll
 
     @property
+    def position(self) -> ca.SX:
+        """The base's origin, 3 x 1, m, inertial axes."""
+        return ca.vertcat(0, self.b[0], 0)
+
+    @property
     def omega(self) -> ca.SX:
         """Angular velocity, 3 x 1, rad/s, base axes: roll rate along x plus pitch rate along the inertial z."""
         return ca.vertcat(self.db[2], self.db[1] * ca.sin(self.b[2]), self.db[1] * ca.cos(self.b[2]))

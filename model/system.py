@@ -31,6 +31,7 @@ from springline.model.control import (
     commanded,
     fast_control,
 )
+from springline.model.declared import column
 from springline.model.drive import (
     DRIVES,
     EPSILON,
@@ -59,6 +60,8 @@ from springline.model.quantities import (
     REFERENCE,
     SATURATED,
     SIGMA,
+    TIP,
+    TIP_RATE,
     U_S,
     U_WISHED,
     B,
@@ -73,6 +76,7 @@ from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
 from springline.model.symbolic import as_written
 from springline.model.terms import Term, noted
+from springline.model.tip import tip_motion
 
 
 def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tuple[Parameter, ...]:
@@ -250,10 +254,35 @@ class System:
         """The disturbance, where there is one."""
         return () if self.disturbance is None else (DISTURBANCE,)
 
+    @cached_property
+    def tip(self) -> ca.SX | None:
+        """Position and rate of the tip by b, db, q1, dq1 and p, in the order of TIP and TIP_RATE; None without one."""
+        tip = self.mechanism.tip(self.q1, self._plant)
+        if tip is None:
+            return None
+        point = column(f"mechanism {self.mechanism.name}", "tip", tip, 3, [self.q1, *self._plant.values()])
+        return tip_motion(point, self.q1, self.dq1, self.base)
+
+    @property
+    def observed(self) -> tuple[Quantity, ...]:
+        """What follows from the state and the signals, where the mechanism has it, and is computed for rows alone."""
+        return () if self.tip is None else (*TIP, *TIP_RATE)
+
     @property
     def columns(self) -> tuple[Quantity, ...]:
         """What a trajectory shows, in the order of the loop's rows."""
-        return (T, *self.drive.state, Q1D, E, *self.sliding, U, *self.controller_states, B, *self.forces)
+        return (
+            T,
+            *self.drive.state,
+            Q1D,
+            E,
+            *self.sliding,
+            U,
+            *self.controller_states,
+            B,
+            *self.forces,
+            *self.observed,
+        )
 
     @property
     def trajectory(self) -> tuple[Entry, ...]:
@@ -380,6 +409,8 @@ class System:
             for law in {**LAWS, self.structure.law: self.controller.law}.values():
                 rate = law.with_form(self.structure.log_form).rate(sigma, self._control)
                 result |= function(f"law_{law.name}", [sigma], [rate], ["sigma"], ["dsigma"])
+        if self.tip is not None:
+            result |= function("tip", [base.b, base.db, x], [self.tip], ["b", "db", "x"], ["tip"])
         energy = self._arm_energy() + self.drive.energy(x, self.mechanism, self._plant)
         return {
             **result,
@@ -405,6 +436,9 @@ class System:
             **function("loop_error", ins, seen[1:3], names, ["e", "sigma"]),
             **function("loop_plant", [w, x, self.u], [dx], ["w", "x", "u"], ["dx"]),
         }
+        if self.tip is not None:
+            at = ca.substitute(self.tip, w, self._signal_expressions)
+            result |= function("loop_tip", [self.t, self.d, x], [at], ["t", "d", "x"], ["tip"])
         if self.controller.states:
             result |= {
                 **function("loop_rates", ins, later[:1], names, ["dz"]),

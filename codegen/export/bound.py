@@ -168,6 +168,7 @@ def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
         "t": of(T),
         "d": [(f"d{k}", "") for k in range(system.d.numel())],
         "w": of(*REFERENCE, *BASE, *system.forces),
+        "tip": of(*system.observed),
         DISTURBANCE.name: of(DISTURBANCE),
         "x": state,
         "y": [(f"measured_{name}", unit) for name, unit in state],

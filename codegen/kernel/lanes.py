@@ -86,7 +86,8 @@ class _Emitter:
         w = outputs["signals"][0]
         self.observed = [*w[:n], *w[3 * n : 3 * n + len(COORDINATES)]]
         self.observed += w[len(w) - len(entries(program.system.forces, program.system.joints)) :]
-        for wanted in (*self.state_functions.values(), self.observed, outputs["start"][0]):
+        self.tip = outputs["tip"][0] if "tip" in outputs else []
+        for wanted in (*self.state_functions.values(), self.observed, outputs["start"][0], self.tip):
             self._keep(wanted, Binding.STATE)
         self._keep(list(self.slots[Binding.VARYING]), Binding.VARYING)
         self._keep(list(self.slots[Binding.UNIFORM]), Binding.UNIFORM)
@@ -400,6 +401,12 @@ class _Emitter:
             ]
             return "\n".join([checked.replace("static inline", "SL_RARE"), *fast])
 
+        at_row = f"double time, const double *data, const sl_group *x, {given}, sl_group *tip"
+        tip = (
+            [self._function("tip", at_row, self.tip, Binding.STATE, into("tip"), self._given, ["g"])]
+            if self.tip
+            else []
+        )
         return "\n".join(
             [
                 "/* ---- once per run ---- */\n",
@@ -449,6 +456,7 @@ class _Emitter:
                     self._given,
                     ["g"],
                 ),
+                *tip,
                 "/* ---- at every evaluation ---- */\n",
                 state("closed", now, {"dx": states + memory, **control}),
                 state("control", sampling, sample),

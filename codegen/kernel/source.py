@@ -63,6 +63,7 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
 #define SL_SAMPLED {int(sampled)}
 #define SL_NZ {memory}
 #define SL_SLIDING {sliding}
+#define SL_NTIP {len(program.system.observed)}
 #include "sl_lanes.h"
 
 typedef sl_v sl_group[SL_G]; /* one quantity of a pack of runs */

@@ -4,10 +4,10 @@
  * A pack is SL_G groups of SL_W lanes, a lane is one run; SL_PACKS packs go through time side by side. "kernel.h" comes
  * from a generator and provides
  *   sizes        SL_W SL_G SL_PACKS; SL_NJ joints, SL_NX states, the last SL_NZ of them the controller's, SL_NB base
- *                coordinates, SL_NF disturbance forces, SL_NP parameters, SL_NR, SL_NU, SL_NV (values bound once per run; once per time and the same
- *                for all runs; once per time and run), SL_ND, SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller
- *                has a sliding variable) 0 or 1
- *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals
+ *                coordinates, SL_NF disturbance forces, SL_NTIP numbers of the tip, SL_NP parameters, SL_NR, SL_NU, SL_NV
+ *                (values bound once per run; once per time and the same for all runs; once per time and run), SL_ND,
+ *                SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller has a sliding variable) 0 or 1
+ *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals; kernel_tip, for rows alone, where SL_NTIP > 0
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
  *                needed for long), sl_node, sl_when, sl_kept, kernel_update
@@ -31,7 +31,7 @@ enum {
   SL_BLOCK = (SL_INSTANTS + SL_W - 1) / SL_W * SL_W, /* instants whose uniform signals are evaluated together */
   SL_NPLANT = SL_NX - SL_NZ,
   SL_NSIGMA = SL_NJ * SL_SLIDING,
-  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB + SL_NF
+  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB + SL_NF + SL_NTIP
 };
 
 /* ---- signals ------------------------------------------------------------------------------------------- */
@@ -114,6 +114,12 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
   const sl_job *job = pack->job;
   sl_group q1d[SL_NJ], b[SL_NB + SL_NF]; /* forces behind the base */
   int i;
+#if SL_NTIP > 0
+  sl_group tip[SL_NTIP];
+  double d[SL_ND + 1] = {0.0}; /* likewise */
+  sl_table_data(job->tables, SL_NTABLES, step_time(job, k), d, 1);
+  kernel_tip(step_time(job, k), d, (const sl_group *)pack->x, (const sl_group *)pack->p, (const sl_group *)pack->r, tip);
+#endif
   kernel_signals(now, (const sl_group *)pack->p, (const sl_group *)pack->r, q1d, b);
   for (; lane < end; lane++) {
     const int64_t run = pack->run[lane];
@@ -128,6 +134,9 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
     for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->u[i], lane);
     for (i = SL_NPLANT; i < SL_NX; i++) *row++ = lane_of(pack->x[i], lane);
     for (i = 0; i < SL_NB + SL_NF; i++) *row++ = lane_of(b[i], lane);
+#if SL_NTIP > 0
+    for (i = 0; i < SL_NTIP; i++) *row++ = lane_of(tip[i], lane);
+#endif
   }
 }
 

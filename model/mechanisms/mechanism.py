@@ -80,6 +80,10 @@ class Mechanism(ABC):
     def potential_energy(self, q: ca.SX, gravity: ca.SX, p: Values) -> ca.SX:
         """V, J.  gravity: 3 x 1 vector that points up, m/s^2, base axes."""
 
+    def tip(self, q: ca.SX, p: Values) -> ca.SX | None:
+        """Where the arm ends, 3 x 1, m, base axes; None for an arm that does not say."""
+        return None
+
     def fitted(self, parameter: Parameter) -> Parameter:
         """A parameter of the controller with the default that suits this arm.
 
