@@ -27,7 +27,7 @@ LAYERS = {
 }  # fmt: skip
 STRANGERS = {
     "model": {"casadi", "numpy", "lazy_loader"},
-    "codegen": {"casadi", "numpy", "lazy_loader"},
+    "codegen": {"casadi", "jinja2", "numpy", "lazy_loader"},
 }
 """What is not of the standard library and may be imported, where that is not everything."""
 

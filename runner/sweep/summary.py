@@ -16,6 +16,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import compute
 
+from springline.codegen.files import render
 from springline.codegen.kernel import CHATTERING, METRICS, STATUS, chatters
 from springline.model.parameters import Joint
 from springline.runner.files import units, value_text
@@ -239,27 +240,17 @@ def _cell(value: object) -> str:
 
 def markdown(plan: Plan, summary: Summary, figures: Sequence[str], name: str) -> str:
     """summary.md: the tables, and the figures by file name."""
-    keys = [axis.key for axis in plan.sweep.axes]
-    varied = "\n".join(f"- `{axis.key}`: `{value_text(axis.as_toml())}`" for axis in plan.sweep.axes)
-    sections = [
-        f"# {name}",
-        f"{summary.runs:,} of {plan.runs:,} runs of `{plan.sweep.scenario.source}` ({plan.sweep.method}, "
-        f"seed {plan.sweep.seed}).\n\n{varied}",
-        "## What became of the runs\n\n"
-        + _markdown_table(outcome_rows(summary))
-        + f"\n\nA run chatters where `chatter_` of a joint is above {CHATTERING:g} 1/s: its command swings so often "
-        "that its other metrics say little.",
-        *(f"![{figure.rpartition('.')[0]}]({figure})" for figure in figures),
-        "## Metrics\n\nQuantiles over the runs that have the metric; the last column is the share that has not.\n\n"
-        + _markdown_table(metric_rows(summary)),
-        "## The worst runs\n\nThose that stopped, the earliest first; then those with the largest steady-state error. "
-        "`springline replay` simulates one of them again with its trajectory.\n\n"
-        + _markdown_table(worst_rows(summary, keys)),
-    ]
-    return "\n\n".join(sections) + "\n"
-
-
-def _markdown_table(table: Rows) -> str:
-    header, rows = table
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+    axes = plan.sweep.axes
+    return render(
+        "springline.runner.sweep",
+        "summary.md.j2",
+        name=name,
+        plan=plan,
+        runs=summary.runs,
+        varied=[(axis.key, value_text(axis.as_toml())) for axis in axes],
+        outcomes=outcome_rows(summary),
+        chattering=f"{CHATTERING:g}",
+        figures=figures,
+        metrics=metric_rows(summary),
+        worst=worst_rows(summary, [axis.key for axis in axes]),
+    )

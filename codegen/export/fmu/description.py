@@ -1,4 +1,8 @@
-"""modelDescription.xml of FMI 2.0 and 3.0, and buildDescription.xml."""
+"""modelDescription.xml of FMI 2.0 and 3.0, and buildDescription.xml.
+
+Built as trees, not printed from templates: which attributes an element has depends on FMI's version and on the
+variable, and the library that writes the tree sees to it that the XML is well-formed.
+"""
 
 from __future__ import annotations
 

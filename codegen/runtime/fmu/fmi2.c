@@ -1,9 +1,9 @@
 /*
- * fmi2.c - the functions of FMI 2.0 for Co-Simulation; those for Model Exchange are there and say that they are not
- * offered.
+ * fmi2.c - the functions of FMI 2.0 for Co-Simulation; those for Model Exchange are there and say
+ * that they are not offered.
  *
- * Built as a shared library the functions have their plain names. For static linking define FMI2_FUNCTION_PREFIX as the
- * model identifier followed by an underscore, as the standard asks.
+ * Built as a shared library the functions have their plain names. For static linking define
+ * FMI2_FUNCTION_PREFIX as the model identifier followed by an underscore, as the standard asks.
  */
 #include "fmi2Functions.h"
 
@@ -11,7 +11,8 @@ typedef fmi2CallbackLogger fmu_logger;
 
 #include "instance.h"
 
-/* The standard's message is a format. Clients without variadic callbacks take it as it is: it holds the text itself. */
+/* The standard's message is a format. Clients without variadic callbacks take it as it is: it holds
+ * the text itself. */
 static void fmu_log(const fmu_instance *fmu, const char *message) {
   char format[2 * FMU_MESSAGE];
   size_t n = 0;
@@ -26,9 +27,11 @@ static void fmu_log(const fmu_instance *fmu, const char *message) {
 
 static fmi2Status result_of(int result) { return result == FMU_OK ? fmi2OK : fmi2Error; }
 
-static fmi2Status not_offered(fmi2Component c, const char *function) { return result_of(fmu_unsupported(c, function)); }
+static fmi2Status not_offered(fmi2Component c, const char *function) {
+  return result_of(fmu_unsupported(c, function));
+}
 
-/* ---- life -------------------------------------------------------------------------------------------------- */
+/* ---- life ---------------------------------------------- */
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
@@ -42,19 +45,22 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
   if (!fmu_given(c, "fmi2SetDebugLogging", categories, nCategories)) return fmi2Error;
   for (i = 0; i < nCategories; i++) {
     if (categories[i] == NULL || strcmp(categories[i], "logStatusError") != 0) {
-      return result_of(fmu_refuse(c, "fmi2SetDebugLogging: the only log category is logStatusError"));
+      return result_of(
+          fmu_refuse(c, "fmi2SetDebugLogging: the only log category is logStatusError"));
     }
   }
   return fmi2OK;
 }
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
-                              fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
-                              fmi2Boolean visible, fmi2Boolean loggingOn) {
+                              fmi2String fmuResourceLocation,
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible,
+                              fmi2Boolean loggingOn) {
   fmu_instance *fmu;
   (void)fmuResourceLocation, (void)visible, (void)loggingOn;
   if (functions == NULL) return NULL;
-  fmu = fmu_new("fmi2Instantiate", instanceName, fmuGUID, functions->logger, functions->componentEnvironment);
+  fmu = fmu_new("fmi2Instantiate", instanceName, fmuGUID, functions->logger,
+                functions->componentEnvironment);
   if (fmu != NULL && fmuType != fmi2CoSimulation) {
     (void)fmu_unsupported(fmu, "fmi2Instantiate for Model Exchange");
     free(fmu);
@@ -65,11 +71,12 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
 
 void fmi2FreeInstance(fmi2Component c) { free(c); }
 
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
-                               fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
+                               fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
   (void)toleranceDefined, (void)tolerance;
   if (!fmu_allowed(c, "fmi2SetupExperiment", FMU_INSTANTIATED)) return fmi2Error;
-  return result_of(fmu_set_experiment(c, "fmi2SetupExperiment", startTime, stopTimeDefined != fmi2False, stopTime));
+  return result_of(fmu_set_experiment(c, "fmi2SetupExperiment", startTime,
+                                      stopTimeDefined != fmi2False, stopTime));
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
@@ -97,22 +104,26 @@ fmi2Status fmi2Reset(fmi2Component c) {
   return result_of(fmu_reset(c, "fmi2Reset"));
 }
 
-/* ---- values ------------------------------------------------------------------------------------------------ */
+/* ---- values ---------------------------------------------- */
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                       fmi2Real value[]) {
   size_t i;
   if (!fmu_allowed(c, "fmi2GetReal", FMU_ANY)) return fmi2Error;
-  if (!fmu_given(c, "fmi2GetReal", vr, nvr) || !fmu_given(c, "fmi2GetReal", value, nvr)) return fmi2Error;
+  if (!fmu_given(c, "fmi2GetReal", vr, nvr) || !fmu_given(c, "fmi2GetReal", value, nvr))
+    return fmi2Error;
   for (i = 0; i < nvr; i++) {
     if (fmu_get(c, "fmi2GetReal", vr[i], 0, &value[i]) != FMU_OK) return fmi2Error;
   }
   return fmi2OK;
 }
 
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[]) {
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          fmi2Boolean value[]) {
   size_t i;
   if (!fmu_allowed(c, "fmi2GetBoolean", FMU_ANY)) return fmi2Error;
-  if (!fmu_given(c, "fmi2GetBoolean", vr, nvr) || !fmu_given(c, "fmi2GetBoolean", value, nvr)) return fmi2Error;
+  if (!fmu_given(c, "fmi2GetBoolean", vr, nvr) || !fmu_given(c, "fmi2GetBoolean", value, nvr))
+    return fmi2Error;
   for (i = 0; i < nvr; i++) {
     double number;
     if (fmu_get(c, "fmi2GetBoolean", vr[i], 1, &number) != FMU_OK) return fmi2Error;
@@ -121,44 +132,53 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
   return fmi2OK;
 }
 
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                       const fmi2Real value[]) {
   if (!fmu_allowed(c, "fmi2SetReal", FMU_SETTABLE)) return fmi2Error;
-  if (!fmu_given(c, "fmi2SetReal", vr, nvr) || !fmu_given(c, "fmi2SetReal", value, nvr)) return fmi2Error;
+  if (!fmu_given(c, "fmi2SetReal", vr, nvr) || !fmu_given(c, "fmi2SetReal", value, nvr))
+    return fmi2Error;
   return result_of(fmu_set(c, "fmi2SetReal", vr, nvr, value));
 }
 
-/* There is no variable of these types, and no Boolean that could be set; asking for none of them is no mistake. */
+/* There is no variable of these types, and no Boolean that could be set; asking for none of them is
+ * no mistake. */
 static fmi2Status none_of(fmi2Component c, const char *function, size_t nvr) {
   if (!fmu_allowed(c, function, FMU_ANY)) return fmi2Error;
-  return nvr == 0 ? fmi2OK : result_of(fmu_refuse(c, "%s: this FMU has no such variable", function));
+  return nvr == 0 ? fmi2OK
+                  : result_of(fmu_refuse(c, "%s: this FMU has no such variable", function));
 }
 
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          fmi2Integer value[]) {
   (void)vr, (void)value;
   return none_of(c, "fmi2GetInteger", nvr);
 }
 
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[]) {
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                         fmi2String value[]) {
   (void)vr, (void)value;
   return none_of(c, "fmi2GetString", nvr);
 }
 
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[]) {
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          const fmi2Integer value[]) {
   (void)vr, (void)value;
   return none_of(c, "fmi2SetInteger", nvr);
 }
 
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[]) {
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          const fmi2Boolean value[]) {
   (void)vr, (void)value;
   return none_of(c, "fmi2SetBoolean", nvr);
 }
 
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[]) {
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                         const fmi2String value[]) {
   (void)vr, (void)value;
   return none_of(c, "fmi2SetString", nvr);
 }
 
-/* ---- saved states ------------------------------------------------------------------------------------------ */
+/* ---- saved states ---------------------------------------------- */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
   if (!fmu_allowed(c, "fmi2GetFMUstate", FMU_ANY)) return fmi2Error;
@@ -188,7 +208,8 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
   return fmi2OK;
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
+                                 size_t size) {
   if (!fmu_allowed(c, "fmi2SerializeFMUstate", FMU_ANY)) return fmi2Error;
   if (!fmu_given(c, "fmi2SerializeFMUstate", FMUstate, 1)) return fmi2Error;
   if (!fmu_given(c, "fmi2SerializeFMUstate", serializedState, 1)) return fmi2Error;
@@ -203,9 +224,10 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
   return result_of(fmu_deserialize(c, "fmi2DeSerializeFMUstate", serializedState, size, FMUstate));
 }
 
-/* ---- steps ------------------------------------------------------------------------------------------------- */
+/* ---- steps ---------------------------------------------- */
 
-fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
+                      fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
   (void)noSetFMUStatePriorToCurrentPoint;
   if (!fmu_allowed(c, "fmi2DoStep", FMU_STEPPING)) return fmi2Error;
@@ -226,7 +248,8 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
   return not_offered(c, "fmi2GetRealOutputDerivatives");
 }
 
-/* Steps are done when fmi2DoStep returns, so of the statuses there are the last time and whether it ended. */
+/* Steps are done when fmi2DoStep returns, so of the statuses there are the last time and whether it
+ * ended. */
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
   (void)s, (void)value;
   (void)fmu_unsupported(c, "fmi2GetStatus");
@@ -262,12 +285,14 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
   return fmi2Discard;
 }
 
-/* ---- what this FMU does not offer -------------------------------------------------------------------------- */
+/* ---- what this FMU does not offer ---------------------------------------------- */
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
-                                        const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[],
+                                        size_t nUnknown, const fmi2ValueReference vKnown_ref[],
+                                        size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-  (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
+  (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown,
+      (void)dvUnknown;
   return not_offered(c, "fmi2GetDirectionalDerivative");
 }
 
@@ -278,10 +303,14 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
   return not_offered(c, "fmi2NewDiscreteStates");
 }
 
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return not_offered(c, "fmi2EnterContinuousTimeMode"); }
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
+  return not_offered(c, "fmi2EnterContinuousTimeMode");
+}
 
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation) {
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
+                                       fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi2Boolean *enterEventMode,
+                                       fmi2Boolean *terminateSimulation) {
   (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
   return not_offered(c, "fmi2CompletedIntegratorStep");
 }
