@@ -19,7 +19,6 @@ from springline.codegen.kernel.settings import LoopSettings
 from springline.codegen.kernel.spec import KernelOptions, KernelSpec
 from springline.codegen.program.frozen import Program
 from springline.codegen.program.tables import SignalTable
-from springline.model.base import COORDINATES
 
 STEP, PERIOD, DURATION = 1e-4, 1e-3, 0.3
 SAMPLED = Settings(duration=DURATION, step=STEP, period=PERIOD)
@@ -113,10 +112,8 @@ Open = Callable[[Path], Client]
 
 
 def columns(of: Program) -> list[str]:
-    """Names of a trajectory's columns after t, in the order of loop.c."""
-    joints = [joint.name for joint in of.system.joints]
-    quantities = ("q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U")
-    return [*(f"{q}_{joint}" for q in quantities for joint in joints), *(c.symbol for c in COORDINATES)]
+    """Names of a trajectory's columns after t."""
+    return [entry.name for entry in of.system.trajectory[1:]]
 
 
 def own_run(

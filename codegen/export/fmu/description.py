@@ -104,7 +104,9 @@ def model_description(
             ET.SubElement(unknowns, "Unknown", index)
     else:
         for reference in interface.of("output"):
-            ET.SubElement(structure, "Output", {"valueReference": str(reference), "dependencies": _list(depends[reference])})
+            ET.SubElement(
+                structure, "Output", {"valueReference": str(reference), "dependencies": _list(depends[reference])}
+            )
         for reference in interface.of("output"):
             ET.SubElement(structure, "InitialUnknown", {"valueReference": str(reference)})
     return _xml(root)
