@@ -10,12 +10,13 @@ from springline.model.base import BaseMotion
 def tip_motion(tip: ca.SX, q: ca.SX, dq: ca.SX, base: BaseMotion) -> ca.SX:
     """Position and rate of a point of the arm, 12 x 1, m and m/s, in the order of quantities.TIP and TIP_RATE.
 
-    tip  3 x 1, base axes, of q;  q, dq  n x 1;  entries of q and base.b are symbols
+    tip  3 x 1, arm axes, of q;  q, dq  n x 1;  entries of q and base.b are symbols
     """
-    inertial = base.position + base.rotation @ tip
+    ship = base.on_ship(tip)
+    inertial = base.position + base.rotation @ ship
     return ca.vertcat(
-        tip,
+        ship,
         inertial,
-        ca.jtimes(tip, q, dq),
+        ca.jtimes(ship, q, dq),
         ca.jtimes(inertial, ca.vertcat(q, base.b), ca.vertcat(dq, base.db)),
     )
