@@ -64,8 +64,8 @@ STATUSES = {
     "ok": "",
     "diverged": "the state, or what the control computed from it, left the finite numbers",
     "out_of_bounds": "the state left the bound of the job",
-    "out_of_limits": "a joint left the limits of the job",
     "stopped": "the caller asked to stop",
+    "out_of_limits": "a joint left the limits of the job",
 }
 """How a run ends, in the order of their numbers: name -> meaning."""
 

@@ -38,7 +38,7 @@ from springline.runner.scenario.locate import packaged_scenarios, packaged_sweep
 from springline.runner.scenario.scenario import load_scenario, parse_set
 
 MAIN = "from springline.runner.cli import main; main()"
-FIGURES = {"tracking", "error", "force", "sliding", "springs", "steady_state", "base_motion"}
+FIGURES = {"tracking", "error", "force", "sliding", "springs", "steady_state", "base_motion", "tip"}
 SHORT = """\
 [base_motion]
 kind = "sine"

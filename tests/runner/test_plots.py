@@ -15,7 +15,7 @@ from springline.runner.run.figures import run_figures
 from springline.runner.run.simulation import Result, simulate
 from springline.runner.scenario.scenario import Scenario, load_scenario
 
-ALWAYS = {"tracking", "error", "force", "sliding", "springs"}
+ALWAYS = {"tracking", "error", "force", "sliding", "springs", "tip"}
 
 Run = tuple[Scenario, Result]
 
