@@ -119,6 +119,15 @@ class BaseState:
         return turned(self._of(self.b, "roll"), self._of(self.b, "pitch"), self._find(self.b, "yaw"))
 
     @property
+    def position(self) -> ca.SX:
+        """The base's origin, 3 x 1, m, inertial axes."""
+        return ca.vertcat(0, self.b[0], 0)
+
+    def on_ship(self, point: ca.SX) -> ca.SX:
+        """A point of the arm's axes in the ship's, 3 x 1, m: the same, for the arm stands at the base's origin."""
+        return point
+
+    @property
     def omega(self) -> ca.SX:
         """Angular velocity, 3 x 1, rad/s, arm axes."""
         return self._in_arm_axes(self._omega)

@@ -102,6 +102,21 @@ DB = Quantity("d_", r"\dot b", "{q}/s", "rate of the base", per="base")
 DDB = Quantity("dd_", r"\ddot b", "{q}/s^2", "acceleration of the base", per="base")
 BASE = (B, DB, DDB)
 
+# The links
+DISTURBANCE = Quantity("disturbance", "F_d", "{F}", "disturbance force on the link, positive along +q1")
+
+# The tip: in the ship's axes from the base's origin, and in the inertial ones, which the ship has at rest
+_TIP = [
+    (f"{axis}_{frame}", rf"{axis}_\mathrm{{{frame}}}", f"tip along {axis}, {meaning}, {seen}")
+    for frame, seen in (("ship", "as seen from the ship"), ("inertial", "as seen from the earth"))
+    for axis, meaning in (("x", "forward"), ("y", "up"), ("z", "to starboard"))
+]
+TIP = tuple(Quantity(f"tip_{name}", symbol, "m", meaning, per="scalar") for name, symbol, meaning in _TIP)
+TIP_RATE = tuple(
+    Quantity(f"d_tip_{name}", rf"\dot {symbol}", "m/s", f"rate of the {meaning}", per="scalar")
+    for name, symbol, meaning in _TIP
+)
+
 # The controller
 U = Quantity("U", "U", "{F}", "command to the motor")
 E = Quantity("e", "e", "{q}", "tracking error")

@@ -1,4 +1,4 @@
-"""Symbols of reference and base motion: parameters where they are formulas, data where they are tables."""
+"""Symbols of reference, base motion and disturbance: parameters where they are formulas, data where they are tables."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from springline.model.parameters import Joint, ParameterVector
 from springline.model.signals import CONSTANT_ZERO, Signal
 from springline.model.structure import SignalShape, TableLayout
 
-SignalTableName = Literal["reference", "base_motion"]
+SignalTableName = Literal["reference", "base_motion", "disturbance"]
 
 _C_NAMES = {c.key: c.alias for c in COORDINATES if c.alias}
 """What C has called the terms of a coordinate before it had its name of today, and still does."""
@@ -45,7 +45,7 @@ class SignalSymbols:
         coordinates: list[tuple[str, str]],
     ) -> list[Signal]:
         """Expressions of one vector signal; appends its parameters to the vector or its data to d."""
-        if shape.kind == "none":
+        if shape.kind in ("none", "input"):
             return [CONSTANT_ZERO] * len(coordinates)
         if shape.kind == "table":
             return self._table(table, shape, [key for key, _ in coordinates])
@@ -86,9 +86,9 @@ class SignalSymbols:
     def _sines(self, table: str, key: str, unit: str, count: int) -> Signal:
         offset = ca.SX(0)
         dotted, stem = f"{table}.{key}", f"{table}_{_C_NAMES.get(key, key)}"
-        if table == "reference":
+        if table != "base_motion":
             offset = self._vector.scalar(
-                f"{dotted}.offset", f"{stem}_offset", unit, 0.0, f"offset of the {key} reference"
+                f"{dotted}.offset", f"{stem}_offset", unit, 0.0, f"offset of the {key} {table}"
             )
             dotted += ".terms"
         terms = [

@@ -9,7 +9,7 @@ from springline.model.base import BaseCoordinate, moving
 from springline.model.control import LogForm, SurfaceExponents
 from springline.model.drive import DriveKind
 
-SignalKind = Literal["none", "sine", "polynomial", "table", "own"]
+SignalKind = Literal["none", "sine", "polynomial", "table", "own", "input"]
 MotorStart = Literal["unloaded", "equilibrium", "given"]
 JointStart = Literal["given", "reference"]
 
@@ -18,6 +18,7 @@ JointStart = Literal["given", "reference"]
 class SignalShape:
     """The shape of a vector signal: its kind, and what it has per coordinate.
 
+    kind   "input": its values come from outside, step by step, and are zero in a simulation
     terms  sine: number of terms; polynomial: number of via points; table and own: 1 for one that moves, 0 (zero)
            without; of the base one for each of COORDINATES, of which zeros at the end may be left out
     own    the user's class that it is, by its key in MOTIONS
@@ -36,6 +37,8 @@ class Structure:
     controller     by name; law, log_form and exponents are those of one that has a reaching law
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
     effects        properties of sensors and motors, by name, in the order in which they act
+    disturbance    forces on the links, per joint; not even zero where its kind is "none"
+    friction       damping and friction that there is, names of drive.FRICTION in their order
     initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
                    told; on the reference they start with springs that carry the arm along it
     mount          whether the arm's foot stands elsewhere than at the base's origin
@@ -57,6 +60,8 @@ class Structure:
     size: int = 0
     mount: bool = False
     mount_rpy: bool = False
+    friction: tuple[str, ...] = ()
+    disturbance: SignalShape = SignalShape()
 
     @property
     def base_coordinates(self) -> tuple[BaseCoordinate, ...]:
@@ -71,6 +76,6 @@ class TableLayout:
     channels: indices of the signal's coordinates that have a column, in the order of their coefficients.
     """
 
-    signal: Literal["reference", "base_motion"]
+    signal: Literal["reference", "base_motion", "disturbance"]
     start: int
     channels: tuple[int, ...]

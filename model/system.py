@@ -4,7 +4,8 @@
     paper's controller). Argument order everywhere: what depends on time, x, z, u, p.
 
 Plant and controller have parameters of their own: "plant.*" is the arm that moves, "mechanism.*" and "drive.*" are what
-the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db, ddb] alone.
+the controller believes of it. Time enters through w = [q1d, dq1d, ddq1d, b, db, ddb] alone, where a
+disturbance acts with its forces behind them.
 """
 
 from __future__ import annotations
@@ -32,7 +33,17 @@ from springline.model.control import (
     commanded,
     fast_control,
 )
-from springline.model.drive import DRIVES, EPSILON, Drive, DriveKind, diagonal, static_motor_position
+from springline.model.declared import column
+from springline.model.drive import (
+    DRIVES,
+    EPSILON,
+    Drive,
+    DriveKind,
+    diagonal,
+    friction,
+    friction_parameters,
+    static_motor_position,
+)
 from springline.model.dynamics import EquationsOfMotion, equations_of_motion
 from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
@@ -42,6 +53,7 @@ from springline.model.quantities import (
     A_LAW,
     A_LIMITED,
     BASE,
+    DISTURBANCE,
     DQ1,
     DQ2,
     METRICS,
@@ -50,6 +62,8 @@ from springline.model.quantities import (
     REFERENCE,
     SATURATED,
     SIGMA,
+    TIP,
+    TIP_RATE,
     U_S,
     U_WISHED,
     E,
@@ -63,6 +77,7 @@ from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
 from springline.model.symbolic import as_written
 from springline.model.terms import Term, noted
+from springline.model.tip import tip_motion
 
 
 def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tuple[Parameter, ...]:
@@ -128,6 +143,7 @@ class System:
 
         vector = ParameterVector()
         arm, drive = self.mechanism.parameters, self.drive.parameters(self.mechanism)
+        drive = (*drive, *friction_parameters(self.structure.drive, self.structure.friction))
         split = (EPSILON,) if self.structure.drive == "elastic" else ()
         self._nominal = vector.table("mechanism", arm, self.joints)
         self._nominal |= vector.table("drive", (*drive, *split), self.joints)
@@ -141,8 +157,12 @@ class System:
         symbols = SignalSymbols(self.t, vector)
         reference = symbols.signal("reference", self.structure.reference, [(j.name, j.unit) for j in self.joints])
         base = symbols.base_motion(self.structure.base_motion, self.joints)
+        force = symbols.signal("disturbance", self.structure.disturbance, [(j.name, j.force) for j in self.joints])
+        disturbed = self.structure.disturbance.kind != "none"
         self.tables, self.d = symbols.tables, symbols.d
-        self._signal_expressions = ca.vertcat(*signals.stack(reference), *signals.stack(base))
+        self._signal_expressions = ca.vertcat(
+            *signals.stack(reference), *signals.stack(base), *(item.value for item in force if disturbed)
+        )
         mount = _mount_symbols(vector, self.structure)
         self._initial = self._initial_values(vector)
         self.p = vector.sx
@@ -153,7 +173,9 @@ class System:
         self.base_motion = tuple(replace(item, coordinates=moving) for item in BASE)
         b, db, ddb = (ca.SX.sym(f"{item.name}b", len(moving)) for item in BASE)
         self.base = BaseState(b, db, ddb, moving, *mount)
-        self.w = ca.vertcat(self.q1d, self.dq1d, self.ddq1d, self.base.b, self.base.db, self.base.ddb)
+        self.disturbance: ca.SX | None = ca.SX.sym("disturbance", n) if disturbed else None
+        applied = () if self.disturbance is None else (self.disturbance,)
+        self.w = ca.vertcat(self.q1d, self.dq1d, self.ddq1d, self.base.b, self.base.db, self.base.ddb, *applied)
         self._state: dict[Quantity, ca.SX] = {item: ca.SX.sym(item.name, n) for item in self.drive.state}
         self.q1, self.dq1 = self._state[Q1], self._state[DQ1]
         self.x = ca.vertcat(*self._state.values())
@@ -210,8 +232,11 @@ class System:
             return ca.vertcat(q, dq)
         stiffness = diagonal(self.mechanism.stiffness, self._plant)
         if self.structure.start == "reference":
+            resistance = friction(self.dq1, self._plant, "link")
+            needed = real.mass @ self.ddq1d + real.bias
+            needed = needed if resistance is None else needed + resistance
             load = ca.substitute(
-                real.mass @ self.ddq1d + real.bias,
+                needed if self.disturbance is None else needed - self.disturbance,
                 ca.vertcat(self.w, self.q1, self.dq1),
                 ca.vertcat(self._signal_expressions, q, dq),
             )
@@ -249,9 +274,39 @@ class System:
         return tuple(float(state.initial) for state in self.controller_states for _ in state.entries(self.joints))
 
     @property
+    def forces(self) -> tuple[Quantity, ...]:
+        """The disturbance, where there is one."""
+        return () if self.disturbance is None else (DISTURBANCE,)
+
+    @cached_property
+    def tip(self) -> ca.SX | None:
+        """Position and rate of the tip by b, db, q1, dq1 and p, in the order of TIP and TIP_RATE; None without one."""
+        tip = self.mechanism.tip(self.q1, self._plant)
+        if tip is None:
+            return None
+        point = column(f"mechanism {self.mechanism.name}", "tip", tip, 3, [self.q1, *self._plant.values()])
+        return tip_motion(point, self.q1, self.dq1, self.base)
+
+    @property
+    def observed(self) -> tuple[Quantity, ...]:
+        """What follows from the state and the signals, where the mechanism has it, and is computed for rows alone."""
+        return () if self.tip is None else (*TIP, *TIP_RATE)
+
+    @property
     def columns(self) -> tuple[Quantity, ...]:
         """What a trajectory shows, in the order of the loop's rows."""
-        return (T, *self.drive.state, Q1D, E, *self.sliding, U, *self.controller_states, self.base_motion[0])
+        return (
+            T,
+            *self.drive.state,
+            Q1D,
+            E,
+            *self.sliding,
+            U,
+            *self.controller_states,
+            self.base_motion[0],
+            *self.forces,
+            *self.observed,
+        )
 
     @property
     def trajectory(self) -> tuple[Entry, ...]:
@@ -274,7 +329,7 @@ class System:
         real, signals = self.arm, self._commanded
         applied = actuated(self.structure.effects, self.u)
         with noted() as terms:
-            dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant)
+            dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant, self.disturbance)
         self._terms["plant"] = tuple(terms)
         return {
             **self._equations(real, signals, dx),
@@ -335,6 +390,8 @@ class System:
         )
         ref_in, ref_names = [self.q1d, self.dq1d, self.ddq1d], ["q1d", "dq1d", "ddq1d"]
         base_in, base_names = [base.b, base.db, base.ddb], ["b", "db", "ddb"]
+        force_in, force_names = ([], []) if self.disturbance is None else ([self.disturbance], [DISTURBANCE.name])
+        plant_in, plant_names = [*base_in, *force_in, x, self.u], [*base_names, *force_names, "x", "u"]
         slow_args, slow_names = [*base_in, q1, dq1, u_slow], [*base_names, "q1", "dq1", "u_s"]
         slow = perturbation.slow_dynamics(u_slow, real.disturbance, real, m2)
         z_in, z_names = ([self.z], ["z"]) if self.controller.states else ([], [])
@@ -345,7 +402,7 @@ class System:
             **function("coriolis", [q1, dq1], [real.coriolis], ["q1", "dq1"], ["C_dq1"]),
             **function("gravity", [q1], [real.gravity], ["q1"], ["G"]),
             **function("base_disturbance", [*base_in, q1, dq1], [real.disturbance], [*base_names, "q1", "dq1"], ["S"]),
-            **function("plant", [*base_in, x, self.u], [dx], [*base_names, "x", "u"], ["dx"]),
+            **function("plant", plant_in, [dx], plant_names, ["dx"]),
             **function("slow_dynamics", slow_args, [slow], slow_names, ["ddq1"]),
         }
         if self.structure.drive == "elastic":
@@ -373,7 +430,7 @@ class System:
         )
         for name, given, given_names in (
             ("control", ins, names),
-            ("plant", [*base_in, x, self.u], [*base_names, "x", "u"]),
+            ("plant", plant_in, plant_names),
         ):
             found = self._terms[name]
             if found:
@@ -388,6 +445,8 @@ class System:
             for law in {**LAWS, self.structure.law: self.controller.law}.values():
                 rate = law.with_form(self.structure.log_form).rate(sigma, self._control)
                 result |= function(f"law_{law.name}", [sigma], [rate], ["sigma"], ["dsigma"])
+        if self.tip is not None:
+            result |= function("tip", [base.b, base.db, x], [self.tip], ["b", "db", "x"], ["tip"])
         energy = self._arm_energy() + self.drive.energy(x, self.mechanism, self._plant)
         return {
             **result,
@@ -413,6 +472,9 @@ class System:
             **function("loop_error", ins, seen[1:3], names, ["e", "sigma"]),
             **function("loop_plant", [w, x, self.u], [dx], ["w", "x", "u"], ["dx"]),
         }
+        if self.tip is not None:
+            at = ca.substitute(self.tip, w, self._signal_expressions)
+            result |= function("loop_tip", [self.t, self.d, x], [at], ["t", "d", "x"], ["tip"])
         if self.controller.states:
             result |= {
                 **function("loop_rates", ins, later[:1], names, ["dz"]),

@@ -19,7 +19,7 @@ from springline.codegen.nearest import nearest
 from springline.codegen.numbers import real as number
 from springline.codegen.program import Real, SignalTable, count_operations
 from springline.model.parameters import Slot
-from springline.model.quantities import DDQ1, DERIVATIVES, REFERENCE, SIGMA, E, Quantity, T, entries
+from springline.model.quantities import DDQ1, DERIVATIVES, DISTURBANCE, REFERENCE, SIGMA, E, Quantity, T, entries
 from springline.model.structure import Structure
 from springline.model.system import System
 
@@ -167,7 +167,9 @@ def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
         **{name: of(item) for name, item in zip(("b", "db", "ddb"), system.base_motion, strict=True)},
         "t": of(T),
         "d": [(f"d{k}", "") for k in range(system.d.numel())],
-        "w": of(*REFERENCE, *system.base_motion),
+        "w": of(*REFERENCE, *system.base_motion, *system.forces),
+        "tip": of(*system.observed),
+        DISTURBANCE.name: of(DISTURBANCE),
         "x": state,
         "y": [(f"measured_{name}", unit) for name, unit in state],
         "dx": of(*(DERIVATIVES[item] for item in system.drive.state)),

@@ -146,6 +146,11 @@ class Kernel:
                 periodic=int(table.periodic),
                 coefficients=data.ctypes.data,
             )
+        if len(settings.limits) not in (0, self.shape.joints):
+            raise ValueError(
+                f"limits has {len(settings.limits)} pairs, expected one for each of {self.shape.joints} joints"
+            )
+        limits = np.array(settings.limits, dtype=np.float64)
         rows = settings.rows
         needed, there = 8 * runs * rows * self.shape.columns, memory()
         if needed > there:
@@ -169,6 +174,7 @@ class Kernel:
             start_time=settings.start_time,
             step=settings.step,
             bound=settings.bound,
+            limits=limits.ctypes.data if limits.size else None,
             hold=settings.hold,
             output_every=settings.output_every,
             response_band=settings.response_band,

@@ -38,6 +38,7 @@ JOB = (
     Member("start_time", "double", "s"),
     Member("step", "double", "h, s"),
     Member("bound", "double", "a run stops when any |x_i| or |z_i| leaves it"),
+    Member("limits", "const double *", "SL_NJ x 2, least and greatest q1 of each joint; NULL: none"),
     Member("hold", "int64_t", "sampled control: steps per sample, >= 1; continuous control ignores it"),
     Member("output_every", "int64_t", "a trajectory row every so many steps, and at the end; 0: no trajectory"),
     Member("response_band", "double", "fraction of |e_i(0)|, 0 where response_error counts"),
@@ -64,6 +65,7 @@ STATUSES = {
     "diverged": "the state, or what the control computed from it, left the finite numbers",
     "out_of_bounds": "the state left the bound of the job",
     "stopped": "the caller asked to stop",
+    "out_of_limits": "a joint left the limits of the job",
 }
 """How a run ends, in the order of their numbers: name -> meaning."""
 

@@ -92,7 +92,9 @@ class _Emitter:
         n = program.system.n
         w = outputs["signals"][0]
         self.observed = [*w[:n], *w[3 * n : 3 * n + program.system.base.b.numel()]]
-        for wanted in (*self.state_functions.values(), self.observed, outputs["start"][0]):
+        self.observed += w[len(w) - len(entries(program.system.forces, program.system.joints)) :]
+        self.tip = outputs["tip"][0] if "tip" in outputs else []
+        for wanted in (*self.state_functions.values(), self.observed, outputs["start"][0], self.tip):
             self._keep(wanted, Binding.STATE)
         self._keep(list(self.slots[Binding.VARYING]), Binding.VARYING)
         self._keep(list(self.slots[Binding.UNIFORM]), Binding.UNIFORM)
@@ -131,7 +133,8 @@ class _Emitter:
             elif node.op is None and kind in ("begin", "first"):
                 names[i] = f"{kind}{k}"
         signal = [f"{q}_{j}" for q in ("q1d", "dq1d", "ddq1d") for j in joints]
-        name(outputs["signals"][0], signal + [f"{d}{c}" for d in ("", "d_", "dd_") for c in base])
+        signal += [f"{d}{c}" for d in ("", "d_", "dd_") for c in base]
+        name(outputs["signals"][0], signal + [entry.name for entry in entries(system.forces, system.joints)])
         for part, label in zip(outputs["control"], ("command", "e", "sigma", "wished", "a_law"), strict=True):
             name(part, [f"{label}_{j}" for j in joints])
         self._name_parts(names)
@@ -420,6 +423,12 @@ class _Emitter:
             ]
             return "\n".join([checked.replace("static inline", "SL_RARE"), *fast])
 
+        at_row = f"double time, const double *data, const sl_group *x, {given}, sl_group *tip"
+        tip = (
+            [self._function("tip", at_row, self.tip, Binding.STATE, into("tip"), self._given, ["g"])]
+            if self.tip
+            else []
+        )
         return "\n".join(
             [
                 "/* ---- once per run ---- */\n",
@@ -469,6 +478,7 @@ class _Emitter:
                     self._given,
                     ["g"],
                 ),
+                *tip,
                 "/* ---- at every evaluation ---- */\n",
                 state("closed", now, {"dx": states + memory, **control}),
                 state("control", sampling, sample),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from springline.codegen.numbers import real, whole
+from springline.codegen.numbers import double, real, whole
 
 MOST_STEPS = 2**53
 """Steps are counted in doubles too, and these hold no more whole numbers without a gap."""
@@ -13,6 +13,8 @@ MOST_STEPS = 2**53
 @dataclass(frozen=True, slots=True)
 class LoopSettings:
     """What the loop is told about every run of a batch: steps of h s, bound on |x_i|, sampling, output, thresholds.
+
+    limits  least and greatest q1 of each joint, infinite where there is none; () for a loop that looks at none
 
     Raises ValueError, with the name and what was expected, for numbers that the loop cannot count or step with.
     """
@@ -27,6 +29,7 @@ class LoopSettings:
     response_error: float = 0.0
     settling_error: float = 0.0
     start_time: float = 0.0
+    limits: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         checked = {
@@ -43,6 +46,10 @@ class LoopSettings:
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)  # the numbers that were checked, whatever type they came in
+        pairs = [tuple(map(double, pair)) for pair in self.limits]
+        if not all(len(pair) == 2 and pair[0] < pair[1] for pair in pairs):
+            raise ValueError(f"limits are {self.limits!r}, expected a pair low < high for each joint")
+        object.__setattr__(self, "limits", tuple(pairs))
         real("end, start_time + steps * step,", self.start_time + self.steps * self.step)
 
     @property

@@ -13,7 +13,7 @@ from springline.codegen.kernel import lanes, toolchain
 from springline.codegen.kernel.job import job_header
 from springline.codegen.kernel.spec import KernelOptions, KernelSpec
 from springline.codegen.program import Program, casadi_c, kernel_update
-from springline.model.quantities import METRICS
+from springline.model.quantities import METRICS, entries
 
 _RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
 
@@ -45,6 +45,7 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
         "SL_NJ": program.system.n,
         "SL_NX": program.size("x") + memory,
         "SL_NB": program.system.base.b.numel(),
+        "SL_NF": len(entries(program.system.forces, program.system.joints)),
         "SL_NP": sizes["p"],
         "SL_NR": sizes["r"],
         "SL_NU": sizes["uniform"],
@@ -61,6 +62,7 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
 #define SL_SAMPLED {int(sampled)}
 #define SL_NZ {memory}
 #define SL_SLIDING {sliding}
+#define SL_NTIP {len(program.system.observed)}
 #include "sl_lanes.h"
 
 typedef sl_v sl_group[SL_G]; /* one quantity of a pack of runs */

@@ -72,6 +72,11 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
         update = call("update", w, s, *at, "&period", p, r, results=["(double *)ahead"])
         rates = call("rates", w, s, *at, p, r, results=[f"(double *)(dx + {states})"])
         sample, closed = f"{control}\n{update}", f"{control}\n{rates}"
+    tip = ""
+    if "tip" in functions:
+        given = "double t, const double *d, const sl_group *x, const sl_group *p, const sl_group *r, sl_group *tip"
+        body = call("tip", "&t", "d", x, p, results=["(double *)tip"])
+        tip = f"static inline void kernel_tip({given}) {{\n{body}\n}}\n\n"
     text = f"""{preamble}
 enum {{ SL_NUMBER_W = {program.size("w")} }};
 
@@ -100,9 +105,10 @@ static inline void kernel_signals(sl_time now, const sl_group *p, const sl_group
   int i;
   for (i = 0; i < SL_NJ; i++) q1d[i][0] = now.varying[i][0];
   for (i = 0; i < SL_NB; i++) b[i][0] = now.varying[3 * SL_NJ + i][0];
+  for (i = 0; i < SL_NF; i++) b[SL_NB + i][0] = now.varying[SL_NUMBER_W - SL_NF + i][0];
 }}
 
-static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
+{tip}static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
 {call("error", w, s, *at, p, r, results=["(double *)e", "(double *)sigma"])}
 }}
 

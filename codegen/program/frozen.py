@@ -13,6 +13,10 @@ and where the controller has states, which error and control then take after x,
     rates(w, s, x, z, p, r) -> dz
     update(w, s, x, z, h, p, r) -> z_next   (one sample of h seconds later)
 
+and where the arm has a tip, for the rows of a trajectory, so that it is computed nowhere else
+
+    tip(t, d, x, p) -> tip
+
 Every parameter is symbolic, common subexpressions are shared, and nothing is rewritten after this point: every engine
 prints these instruction lists, which is why every engine computes the same bits.
 """
@@ -122,8 +126,9 @@ def program(structure: Structure) -> Program:
                 "rates": ([*at, p, r], staged["rates"], [*names_at, "p", "r"], ["dz"]),
                 "update": ([*at, system.h, p, r], staged["update"], [*names_at, "h", "p", "r"], ["z_next"]),
             }
+        observed = {"tip": system.function("loop_tip")} if system.tip is not None else {}
         functions = {
             name: ca.Function(f"loop_{name}", ins, ca.cse([ca.densify(o) for o in outs]), names_in, names_out)
             for name, (ins, outs, names_in, names_out) in signature.items()
-        }
+        } | observed
     return Program(system, functions)

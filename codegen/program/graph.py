@@ -188,6 +188,8 @@ class LoopGraph(ValueGraph):
         beginning = [self.leaf("begin", 0, Binding.STATE)]
         first = [self.leaf("first", i, Binding.STATE) for i in range(program.size("d"))]
         self.add("start", functions["start"], [beginning, first, p, r])
+        if "tip" in functions:
+            self.add("tip", functions["tip"], [beginning, first, x, p])
         [w] = self.add("signals", functions["signals"], [t, d, p, r])
         [s] = self.add("time", functions["time"], [w, p, r])
         self.add("error", functions["error"], [w, s, x, *z, p, r])

@@ -4,10 +4,10 @@
  * A pack is SL_G groups of SL_W lanes, a lane is one run; SL_PACKS packs go through time side by side. "kernel.h" comes
  * from a generator and provides
  *   sizes        SL_W SL_G SL_PACKS; SL_NJ joints, SL_NX states, the last SL_NZ of them the controller's, SL_NB base
- *                coordinates, SL_NP parameters, SL_NR, SL_NU, SL_NV (values bound once per run; once per time and the same
- *                for all runs; once per time and run), SL_ND, SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller
- *                has a sliding variable) 0 or 1
- *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals
+ *                coordinates, SL_NF disturbance forces, SL_NTIP numbers of the tip, SL_NP parameters, SL_NR, SL_NU, SL_NV
+ *                (values bound once per run; once per time and the same for all runs; once per time and run), SL_ND,
+ *                SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller has a sliding variable) 0 or 1
+ *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals; kernel_tip, for rows alone, where SL_NTIP > 0
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
  *                needed for long), sl_node, sl_when, sl_kept, kernel_update
@@ -31,7 +31,7 @@ enum {
   SL_BLOCK = (SL_INSTANTS + SL_W - 1) / SL_W * SL_W, /* instants whose uniform signals are evaluated together */
   SL_NPLANT = SL_NX - SL_NZ,
   SL_NSIGMA = SL_NJ * SL_SLIDING,
-  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB
+  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB + SL_NF + SL_NTIP
 };
 
 /* ---- signals ------------------------------------------------------------------------------------------- */
@@ -85,6 +85,7 @@ typedef struct {
   sl_group kept[SL_KEPT + 1][SL_NX];              /* slopes of the stages that sl_kept names */
   sl_time times[SL_INSTANTS + 1];                 /* the nodes of the step, and its end */
   sl_group varying[SL_INSTANTS + 1][SL_NV + 1];   /* what varies at these times, in turn */
+  sl_group low[SL_NJ], high[SL_NJ]; /* limits of q1, where the job has some; those of a lane that has ended are none */
   sl_metrics metrics[SL_NJ][SL_G];
   sl_clock *clock;
 } sl_pack;
@@ -111,8 +112,14 @@ static sl_time time_at(sl_pack *pack, int64_t j, sl_group *varying) {
 /* A trajectory row at step k for each living lane from `lane` to `end`-1. */
 static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) {
   const sl_job *job = pack->job;
-  sl_group q1d[SL_NJ], b[SL_NB];
+  sl_group q1d[SL_NJ], b[SL_NB + SL_NF]; /* forces behind the base */
   int i;
+#if SL_NTIP > 0
+  sl_group tip[SL_NTIP];
+  double d[SL_ND + 1] = {0.0}; /* likewise */
+  sl_table_data(job->tables, SL_NTABLES, step_time(job, k), d, 1);
+  kernel_tip(step_time(job, k), d, (const sl_group *)pack->x, (const sl_group *)pack->p, (const sl_group *)pack->r, tip);
+#endif
   kernel_signals(now, (const sl_group *)pack->p, (const sl_group *)pack->r, q1d, b);
   for (; lane < end; lane++) {
     const int64_t run = pack->run[lane];
@@ -126,7 +133,18 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
     for (i = 0; i < SL_NSIGMA; i++) *row++ = lane_of(pack->sigma[i], lane);
     for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->u[i], lane);
     for (i = SL_NPLANT; i < SL_NX; i++) *row++ = lane_of(pack->x[i], lane);
-    for (i = 0; i < SL_NB; i++) *row++ = lane_of(b[i], lane);
+    for (i = 0; i < SL_NB + SL_NF; i++) *row++ = lane_of(b[i], lane);
+#if SL_NTIP > 0
+    for (i = 0; i < SL_NTIP; i++) *row++ = lane_of(tip[i], lane);
+#endif
+  }
+}
+
+static void set_limits(sl_pack *pack, int lane, const double *limits) {
+  int i;
+  for (i = 0; i < SL_NJ; i++) {
+    set_lane(pack->low[i], lane, limits ? limits[2 * i] : -SL_INF);
+    set_lane(pack->high[i], lane, limits ? limits[2 * i + 1] : SL_INF);
   }
 }
 
@@ -147,23 +165,37 @@ static void finish_lane(sl_pack *pack, int lane, int64_t k, enum sl_status statu
   job->quantity[run] = quantity;
   pack->alive[lane] = 0;
   pack->live--;
+  if (job->limits) set_limits(pack, lane, NULL);
+}
+
+/* The first joint of a lane whose next position is beyond its limits; SL_NJ if there is none. */
+static int beyond_limits(const sl_pack *pack, int lane) {
+  int i;
+  for (i = 0; pack->job->limits && i < SL_NJ; i++) {
+    const double q = lane_of(pack->next[i], lane);
+    if (q < lane_of(pack->low[i], lane) || q > lane_of(pack->high[i], lane)) return i;
+  }
+  return SL_NJ;
 }
 
 /*
- * Ends the runs whose next state is not finite or out of bounds; they keep the state of step k. Their lanes go on from
+ * Ends the runs whose next state is not finite, out of bounds or beyond the joints' limits; they keep the state of step k. Their lanes go on from
  * zero, so that what they compute stays harmless.
  */
 static void stop_runaways(sl_pack *pack, int64_t k, double bound) {
   const int between_rows = pack->job->output_every > 0 && k % pack->job->output_every != 0;
   int lane, i, bad;
   for (lane = 0; lane < SL_PACK; lane++) {
+    enum sl_status status = SL_OUT_OF_LIMITS;
     for (bad = 0; bad < SL_NX && sl_fabs(lane_of(pack->next[bad], lane)) <= bound; bad++) continue;
-    if (bad == SL_NX) continue;
+    if (bad < SL_NX) {
+      status = sl_fabs(lane_of(pack->next[bad], lane)) <= DBL_MAX ? SL_OUT_OF_BOUNDS : SL_DIVERGED;
+    } else if ((bad = beyond_limits(pack, lane)) == SL_NJ) {
+      continue;
+    }
     if (pack->alive[lane]) {
-      const double value = sl_fabs(lane_of(pack->next[bad], lane));
       if (between_rows) write_row(pack, k, pack->times[0], lane, lane + 1);
-      finish_lane(pack, lane, k, value <= DBL_MAX ? SL_OUT_OF_BOUNDS : SL_DIVERGED,
-                  bad < SL_NPLANT ? bad : bad + 3 * SL_NJ + SL_NSIGMA);
+      finish_lane(pack, lane, k, status, bad < SL_NPLANT ? bad : bad + 3 * SL_NJ + SL_NSIGMA);
     }
     for (i = 0; i < SL_NX; i++) set_lane(pack->next[i], lane, 0.0);
   }
@@ -294,6 +326,7 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
     pack->alive[lane] = lane < pack->lanes;
     for (i = 0; i < SL_NP; i++) set_lane(pack->p[i], lane, job->parameters[run * SL_NP + i]);
     if (lane < pack->lanes && job->rows) job->rows[run] = 0;
+    if (job->limits) set_limits(pack, lane, lane < pack->lanes ? job->limits : NULL);
   }
   kernel_run((const sl_group *)pack->p, pack->r);
   sl_table_data(job->tables, SL_NTABLES, job->start_time, d, 1);
@@ -308,6 +341,16 @@ static int within(const sl_group *x, double bound) {
   int i, g;
   for (i = 0; i < SL_NX; i++) {
     for (g = 0; g < SL_G; g++) inside = inside & (slv_fabs(x[i][g]) <= limit);
+  }
+  return slv_all(inside);
+}
+
+static int within_limits(const sl_pack *pack) {
+  const sl_group *q = (const sl_group *)pack->next;
+  sl_m inside = slv_yes();
+  int i, g;
+  for (i = 0; i < SL_NJ; i++) {
+    for (g = 0; g < SL_G; g++) inside = inside & (q[i][g] >= pack->low[i][g]) & (q[i][g] <= pack->high[i][g]);
   }
   return slv_all(inside);
 }
@@ -327,7 +370,7 @@ static void begin_step(sl_pack *pack, int64_t k) {
 
 static void end_step(sl_pack *pack, int64_t k, double bound) {
   sl_group *next = pack->next;
-  if (!within((const sl_group *)next, bound)) stop_runaways(pack, k, bound);
+  if (!within((const sl_group *)next, bound) || (pack->job->limits && !within_limits(pack))) stop_runaways(pack, k, bound);
   pack->next = pack->x;
   pack->x = next;
 }

@@ -19,6 +19,12 @@ from springline.model.signals import SineTerm
 # no small share, for the slow law eats much of it (docs/paper.md, E13).
 _FAST_DAMPING = 0.5
 
+TAKEN = frozenset({
+    *("name", "limits", "kind", "epsilon", "spring_damping", "link_viscous", "link_coulomb", "motor_viscous"),
+    *("motor_coulomb", "coulomb_velocity"),
+})  # fmt: skip
+"""Keys that [mechanism], [drive] and [plant] have whatever the mechanism is."""
+
 
 class Mechanism:
     """An arm of n joints, n >= 1. A subclass says its joints, parameters, motors and springs, and what it consists of.
@@ -36,6 +42,7 @@ class Mechanism:
     reference_terms   sine terms of the desired trajectory, a tuple per joint; () for none
     start_position    initial joint coordinates; () for all zero
     start_rate        initial joint rates; () for all zero
+    limits            least and greatest coordinate of each joint, beyond which a run ends; () for none
     control_defaults  what the controller's parameters are for this arm, by name: a number, or one per joint
     regular           whether its mass matrix is positive definite for all that its parameters may be
     sizes             how many joints it may have, where that is open; `of_size` then gives the arm with so many
@@ -53,6 +60,7 @@ class Mechanism:
     reference_terms: ClassVar[tuple[tuple[SineTerm, ...], ...]] = ()
     start_position: ClassVar[tuple[float, ...]] = ()
     start_rate: ClassVar[tuple[float, ...]] = ()
+    limits: ClassVar[tuple[tuple[float, float], ...]] = ()
     control_defaults: ClassVar[Mapping[str, float | tuple[float, ...]]] = {}
     _open: ClassVar[frozenset[str]] = frozenset()
     regular: ClassVar[bool] = False
@@ -125,6 +133,10 @@ class Mechanism:
             raise ValueError(f"{owner}: expected a list of at least one Body, got {bodies!r}")
         return [solid(body, f"{owner}[{i}]", [q, *p.values()]) for i, body in enumerate(bodies)]
 
+    def tip(self, q: ca.SX, p: Values) -> ca.SX | None:
+        """Where the arm ends, 3 x 1, m, base axes; None for an arm that does not say."""
+        return None
+
     def fitted(self, parameter: Parameter) -> Parameter:
         """A parameter of the controller with the default that suits this arm.
 
@@ -163,6 +175,13 @@ def check_mechanism(mechanism: Mechanism) -> None:
         expect_parameters(owner, what, declared, () if declared is None else joints)
         names += [item.name for item in getattr(mechanism, what)]
     expect_names(owner, "parameters, motor_inertia and stiffness", names)
+    taken = [name for name in names if name in TAKEN]
+    if taken:
+        raise ValueError(f"{owner}: parameters, motor_inertia and stiffness: {taken[0]!r} is a key of every mechanism")
+    if mechanism.limits and not (
+        len(mechanism.limits) == len(joints) and all(len(pair) == 2 and pair[0] < pair[1] for pair in mechanism.limits)
+    ):
+        raise ValueError(f"{owner}: limits: expected () or a pair low < high per joint, got {mechanism.limits!r}")
     if "g" not in {item.name for item in mechanism.parameters}:
         raise ValueError(f"{owner}: parameters: expected one called g, the gravity in m/s^2")
     for what in ("motor_inertia", "stiffness"):

@@ -1,7 +1,8 @@
 """The reference paper's arm: a lift that slides along the base's y axis and a rotation hinged on it.
 
 Guo et al. 2023, J. Mar. Sci. Eng. 11(3) 474, equation (1); docs/paper.md section 1. In base axes the lifting part's
-centroid is at (L1, y, 0), the rotating part's at (L1 + L3 cos theta, y + L3 sin theta, 0).
+centroid is at (L1, y, 0), the rotating part's at (L1 + L3 cos theta, y + L3 sin theta, 0). The tip is the rotating
+part's other end: J is that of a slender rod with its centroid in the middle, and so of length 2 L3.
 """
 
 from __future__ import annotations
@@ -64,6 +65,11 @@ the loop diverges without any delay.
             ca.vertcat(p.L1, lift, 0),
             ca.vertcat(p.L1 + p.L3 * ca.cos(theta), lift + p.L3 * ca.sin(theta), 0),
         )
+
+    def tip(self, q: ca.SX, p: Values) -> ca.SX:
+        """End of the rotating part, 2 L3 from its hinge."""
+        lift, theta = q[0], q[1]
+        return ca.vertcat(p.L1 + 2 * p.L3 * ca.cos(theta), lift + 2 * p.L3 * ca.sin(theta), 0)
 
     def kinetic_energy(self, q: ca.SX, dq: ca.SX, omega: ca.SX, p: Values) -> ca.SX:
         """1/2 m2 |v2|^2 + 1/2 m3 |v3|^2 + 1/2 J (dtheta + omega_z)^2, J (E7: no inertia about the other axes)."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from springline.model.base import BaseCoordinate
 from springline.model.parameters import Joint
-from springline.model.quantities import Q1, Q2, SIGMA, E, Quantity, U
+from springline.model.quantities import DISTURBANCE, Q1, Q2, SIGMA, TIP, E, Quantity, U
 from springline.runner.files import units
 from springline.runner.report import (
     LINES,
@@ -42,8 +42,8 @@ _MOVES = 1e-12  # a base coordinate that stays below this stands still
 
 def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
     """The overview of one run, by name: tracking, error, force; sliding if there is a sliding variable, springs if
-    there are springs, base_motion if the base moves. If the run came to its end also steady_state, and error_over_base
-    and error_against_base if the base follows a record.
+    there are springs, base_motion if the base moves, disturbance if forces act on the links, tip if the arm has one. If
+    the run came to its end also steady_state, and error_over_base and error_against_base if the base follows a record.
     """
     run = _Run(scenario, result)
     figures: dict[str, Callable[[_Run], Figure]] = {
@@ -58,6 +58,10 @@ def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
         figures["springs"] = _lines("spring", Q2, less=Q1)
     if run.moving:
         figures["base_motion"] = _base_motion
+    if DISTURBANCE in shown:
+        figures["disturbance"] = _lines("disturbance", DISTURBANCE)
+    if TIP[0] in shown:
+        figures["tip"] = _tip
     if run.status == "ok":
         figures["steady_state"] = _steady_state
         if run.moving and scenario.structure().base_motion.kind == "table":
@@ -198,6 +202,18 @@ def _base_motion(run: _Run) -> Figure:
     for axes, coordinate in zip(grid[:, 0], run.moving, strict=True):
         draw(axes, run.t, run[coordinate.symbol], **LINES[0])
         axes.set_ylabel(label(coordinate.key, coordinate.unit))
+    _time_axis(run, figure)
+    legend_above(figure)
+    return figure
+
+
+def _tip(run: _Run) -> Figure:
+    """Where the tip is, as seen from the ship and from the earth."""
+    figure, grid = panels(len(TIP) // 2, height=1.1)
+    for axes, ship, earth in zip(grid[:, 0], TIP[: len(TIP) // 2], TIP[len(TIP) // 2 :], strict=True):
+        draw(axes, run.t, run[earth.name], "from the earth", **LINES[1])
+        draw(axes, run.t, run[ship.name], "from the ship", **LINES[0])
+        axes.set_ylabel(label(f"tip {ship.name.split('_')[1]}", ship.unit))
     _time_axis(run, figure)
     legend_above(figure)
     return figure

@@ -18,4 +18,5 @@ def loop_settings(scenario: Scenario, *, trajectory: bool) -> LoopSettings:
         settling_band=scenario.settling_band,
         response_error=scenario.response_error,
         settling_error=scenario.settling_error,
+        limits=scenario.limits,
     )

@@ -41,7 +41,7 @@ class Result:
 
     trajectory  columns as System.trajectory has them: t, the state, q1d_, e_, sigma_, U_ per joint, the base
     metrics     one row, columns as System.metrics has them; null where there is none
-    status      "ok", "diverged" or "out_of_bounds"
+    status      "ok", "diverged", "out_of_bounds" or "out_of_limits"
     message     one sentence: for a run that stopped, the quantity and the time at which it left its bound; for one that
                 chatters, how much
     """
@@ -61,7 +61,11 @@ def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tup
     quantity = quantity_name(system, place)
     if place >= len(system.trajectory) - 1:  # no column has its name
         quantity = f"the {system.judged[place].meaning}"
-    left = "the finite numbers" if status == "diverged" else f"its bound (|{quantity}| <= {settings.bound:g})"
+    if status == "out_of_limits":
+        low, high = settings.limits[place]
+        left = f"its limits ({low:g} <= {quantity} <= {high:g})"
+    else:
+        left = "the finite numbers" if status == "diverged" else f"its bound (|{quantity}| <= {settings.bound:g})"
     states = (*entries(system.drive.state, system.joints), *system.memory)
     if quantity in {entry.name for entry in states}:
         when = f"at t = {end + settings.step:g} s; results end at t = {end:g} s"

@@ -86,6 +86,7 @@ def resolve(
 
     problems += _band_problems(document["simulation"], given["simulation"], where)
     problems += _start_problems(document["initial"], given["initial"], where)
+    problems += _limit_problems(document, where)
     problems += _via_point_problems(document["reference"], where)
     problems += _exponent_problems(document["control"], where)
     problems += _sampling_problems(document, given["control"], where)
@@ -94,6 +95,7 @@ def resolve(
     units = {
         "reference": {joint.name: joint.unit for joint in joints},
         "base_motion": {c.key: c.unit for c in COORDINATES},
+        "disturbance": {joint.name: joint.force for joint in MECHANISMS[mechanism].joints},
     }
     tables: list[Spline] = []
     notes: list[str] = []
@@ -226,6 +228,17 @@ def _start_problems(initial: dict[str, Any], given: Mapping[str, object], where:
         initial.pop(name, None)
     initial["on_reference"] = True
     return problems
+
+
+def _limit_problems(document: Document, where: str) -> list[Problem]:
+    """No joint is told to start beyond its limits; whether the reference does, the run tells."""
+    limits, start = document["mechanism"].get("limits"), document["initial"].get("q")
+    pairs = zip(limits, start, strict=True) if limits and start else ()
+    return [
+        Problem(where, f"initial.q.{i}", f"expected a start within mechanism.limits.{i}, {low!r} to {high!r}", repr(q))
+        for i, ((low, high), q) in enumerate(pairs)
+        if not low <= q <= high
+    ]
 
 
 def _via_point_problems(reference: Mapping[str, Any], where: str) -> list[Problem]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -19,7 +20,7 @@ from springline.codegen.program import program
 from springline.model.base import COORDINATES, shortest
 from springline.model.base_motion import MOTIONS, moving_terms
 from springline.model.control import CONTROLLERS, LAWS, LogForm, SurfaceExponents
-from springline.model.drive import DRIVES, DriveKind
+from springline.model.drive import DRIVES, FRICTION, DriveKind
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE, Bounds
 from springline.model.structure import MotorStart, SignalKind, SignalShape, Structure
@@ -128,6 +129,12 @@ class Scenario:
         return float(self._simulation["bound"])
 
     @property
+    def limits(self) -> tuple[tuple[float, float], ...]:
+        """Least and greatest coordinate of each joint before a run is stopped; () where there are none."""
+        pairs = tuple((float(low), float(high)) for low, high in self.document["mechanism"].get("limits", ()))
+        return pairs if any(math.isfinite(value) for pair in pairs for value in pair) else ()
+
+    @property
     def response_band(self) -> float:
         """Fraction of |e_i(0)| that defines the response time; 0 where an absolute error does."""
         return float(self._simulation.get("response_band", 0.0))
@@ -164,6 +171,7 @@ class Scenario:
         mechanism = self.registered(self.document["mechanism"]["name"])
         size = size_given(mechanism, self.document["mechanism"])
         joints = [joint.name for joint in MECHANISMS[mechanism].of_size(size).joints]
+        disturbance = _shape(self.document["disturbance"], joints)
         return Structure(
             mechanism=mechanism,
             law=self.registered(control["law"]),
@@ -179,7 +187,14 @@ class Scenario:
             start="reference" if initial.get("on_reference") else "given",
             integrator=self.integrator,
             size=size,
+            disturbance=disturbance if disturbance.kind != "none" else SignalShape(),
+            friction=tuple(item.name for item in FRICTION if self._has(item.name)),
         )
+
+    def _has(self, name: str) -> bool:
+        """Whether a damping or friction is not zero, in the plant or in what the controller believes of it."""
+        given = (self.document["drive"].get(name), self.document["plant"].get(name))
+        return any(number for value in given for _, number in flat(value) if not isinstance(value, dict))
 
     def _base_motion(self) -> SignalShape:
         table = self.document["base_motion"]
@@ -297,11 +312,29 @@ class Scenario:
 
     # Changed and written
 
+    def including(self, values: Mapping[str, ArrayLike]) -> Scenario:
+        """This scenario, with the damping and friction that `values` (dotted key -> numbers) have beyond zero.
+
+        What is zero is no number of the structure, and so none that could vary: it becomes the largest of its numbers.
+        Raises InputError.
+        """
+        present = self.structure().friction
+        added: dict[str, float] = {}
+        for key, numbers in values.items():
+            if absent_at_zero(key) and key.split(".")[1] not in present:
+                try:
+                    column = np.ravel(doubles(numbers))
+                except (TypeError, ValueError):  # `columns_for` says what is wrong
+                    continue
+                positive = column[np.isfinite(column) & (column > 0.0)]
+                added |= {key: float(positive.max())} if positive.size else {}
+        return self.with_overrides(added)
+
     def with_overrides(self, overrides: Mapping[str, object], *, read: bool = True) -> Scenario:
         """This scenario with other values at some dotted keys ("control.mu.0", "plant.m3.scale", …).
 
-        A new kind of reference or base motion, another control mode or mechanism drops what belonged to the old one.
-        Paths count from `folder`. What is going to be changed once more need not `read` its signal files.
+        A new kind of reference, base motion or disturbance, another control mode or mechanism drops what belonged to
+        the old one. Paths count from `folder`. What is going to be changed once more need not `read` its signal files.
         Raises TypeError for what is no mapping of texts, InputError for whatever a file may not hold either.
         """
         expect_keys(overrides, "overrides such as {'control.delta': 0.02}")
@@ -313,8 +346,11 @@ class Scenario:
         document = self._without_excluded(overrides)
         problems = []
         joints = self._joints_with(overrides, where)
-        for key, value in overrides.items():
+        late = [key for key in overrides if self._follows_nominal(key) and key.rpartition(".")[0] not in overrides]
+        for key, value in sorted(overrides.items(), key=lambda item: item[0] in late):
             try:
+                if key in late:
+                    _give_plant_its_own(document, key, joints)
                 document = replaced(document, key.split("."), plain(value), joints)
             except LookupError as error:
                 problems.append(Problem(where, key, f"there is no such entry: {error.args[0]}"))
@@ -331,6 +367,11 @@ class Scenario:
         if read:
             changed.expect_computable(where)
         return changed
+
+    def _follows_nominal(self, key: str) -> bool:
+        """Whether a key is one joint's of a plant's value that is the controller's as long as nothing else is said."""
+        table, *path = key.split(".")
+        return table == "plant" and len(path) > 1 and path[-1].isdecimal() and path[0] not in self.document["plant"]
 
     def expect_computable(self, where: str) -> None:
         """Build what users' classes describe, so that what is wrong with them is told before anything else is done.
@@ -399,7 +440,7 @@ class Scenario:
     def _without_excluded(self, overrides: Mapping[str, object]) -> Document:
         """A copy of the document without what the overrides exclude."""
         document = copy.deepcopy(self.document)
-        for table in ("reference", "base_motion"):
+        for table in ("reference", "base_motion", "disturbance"):
             kind = overrides.get(f"{table}.kind", document[table]["kind"])
             if kind != document[table]["kind"]:
                 stays = {key: document[table][key] for key in ("mount", "mount_rpy") if key in document[table]}
@@ -599,6 +640,21 @@ def _shape(table: Mapping[str, Any], coordinates: Sequence[str]) -> SignalShape:
     counted = {"polynomial": "t", "sine": "terms"}[kind]
     terms = (table[name] for name in coordinates)
     return SignalShape(kind, tuple(len(t[counted] if isinstance(t, dict) else t) for t in terms))
+
+
+def _give_plant_its_own(document: Document, key: str, joints: int) -> None:
+    """Write out what the plant has of the controller's, so that one joint's may become another."""
+    _, name, *rest = key.split(".")
+    nominal = next((document[table][name] for table in ("mechanism", "drive") if name in document[table]), None)
+    if isinstance(nominal, list):
+        document["plant"].setdefault(name, {"scale": [1.0] * joints} if rest[0] == "scale" else nominal)
+
+
+def absent_at_zero(key: str) -> bool:
+    """Whether a dotted key is a damping or friction, which a structure has only where it is not zero."""
+    table, _, rest = key.partition(".")
+    name, _, place = rest.partition(".")
+    return table in ("drive", "plant") and name in {item.name for item in FRICTION} and (not place or place.isdecimal())
 
 
 def _first_outside(bounds: Bounds, column: Floats) -> int | None:

@@ -19,7 +19,7 @@ from springline.codegen.numbers import double
 from springline.model.base import COORDINATES, MOUNT, MOUNT_RPY
 from springline.model.base_motion import MOTIONS
 from springline.model.control import CONTROLLERS, LARGEST_SURFACE_EXPONENT, LAWS, LogForm
-from springline.model.drive import DRIVES, EPSILON, DriveKind
+from springline.model.drive import DRIVES, EPSILON, DriveKind, friction_parameters
 from springline.model.integrators import INTEGRATORS
 from springline.model.mechanisms import MECHANISMS, Mechanism
 from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
@@ -236,6 +236,29 @@ def several(item: Leaf) -> Leaf:
     return Leaf(expected, check)
 
 
+def joint_limits(joints: Sequence[Joint]) -> Leaf:
+    """A pair low < high for each joint, either of them infinite where there is no limit."""
+    names = ", ".join(f"{joint.name} [{joint.unit}]" for joint in joints)
+    expected = f"a pair [low, high] with low < high for each joint ({names}), inf for none"
+
+    def pair(i: int, given: object) -> list[float]:
+        low_high = f"expected [low, high] with low < high [{joints[i].unit}]"
+        try:
+            low, high = map(double, given if isinstance(given, list) else ())
+        except (TypeError, ValueError):
+            raise _wrong(low_high, at=(i,), given=given) from None
+        if not low < high:
+            raise _wrong(low_high, at=(i,), given=given)
+        return [low, high]
+
+    def check(value: object) -> list[list[float]]:
+        if not isinstance(value, list) or len(value) != len(joints):
+            raise _wrong(f"expected {expected}")
+        return [pair(i, given) for i, given in enumerate(value)]
+
+    return Leaf(expected, check)
+
+
 def motor_start(given: Leaf) -> Leaf:
     """How the springs stand at t = 0, by name or as motor coordinates."""
     named = choice("start of the motors", MOTOR_STARTS)
@@ -309,10 +332,10 @@ class Schema:
     kinds: Mapping[str, Mapping[str, type[Section]]]
 
 
-TABLES = ("mechanism", "drive", "plant", "control", "reference", "base_motion", "initial", "simulation")
+TABLES = ("mechanism", "drive", "plant", "control", "reference", "base_motion", "disturbance", "initial", "simulation")
 
 
-DEFAULT_KINDS = {"drive": "elastic", "reference": "sine", "base_motion": "none"}
+DEFAULT_KINDS = {"drive": "elastic", "reference": "sine", "base_motion": "none", "disturbance": "none"}
 """Table -> the kind that it has where none is given."""
 
 
@@ -344,8 +367,9 @@ def schema(
     """
     mechanism = MECHANISMS[name].of_size(size)
     joints = mechanism.joints
-    arm, moving = mechanism.parameters, DRIVES[drive].parameters(mechanism)
+    arm, moving = mechanism.parameters, _drive_parameters(drive, mechanism)
     named = (Annotated[str, door("mechanism", MECHANISMS)], name)
+    limits = (Annotated[Any, joint_limits(joints)], [list(pair) for pair in mechanism.limits] or None)
     shared = _numbers(control_parameters(mechanism, drive), joints)
     own = own_control_tables(Structure(name, law, drive=drive, controller=controller, size=size))
     for taken in own:
@@ -362,20 +386,27 @@ def schema(
         del initial["q_motor"]
     return Schema(
         sections={
-            "mechanism": _section("mechanism", {"name": named, **_size(mechanism), **_numbers(arm, joints)}),
+            "mechanism": _section(
+                "mechanism", {"name": named, **_size(mechanism), "limits": limits, **_numbers(arm, joints)}
+            ),
             "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *moving)}),
             "control": _section("control", shared | _own_tables(own, joints), ControlStructure),
             "initial": _section("initial", initial),
             "simulation": Simulation,
         },
         kinds={
-            "drive": {kind: _drive_section(kind, mechanism) for kind in DRIVES},
+            "drive": {kind: _drive_section(cast(DriveKind, kind), mechanism) for kind in DRIVES},
             "reference": {
                 "sine": _reference_sines(mechanism),
                 "polynomial": _reference_polynomials(mechanism),
                 "table": _table_section({joint.name: joint.unit for joint in joints}),
             },
             "base_motion": _base_motion_sections(motion, joints),
+            "disturbance": {
+                "none": _section("none", {"kind": (Literal["none"], ...)}),
+                "sine": _section("sine", {"kind": (Literal["sine"], ...), **_disturbance_sines(joints)}),
+                "table": _table_section({joint.name: joint.force for joint in joints}),
+            },
         },
     )
 
@@ -411,9 +442,14 @@ def _own_tables(own: Mapping[str, Iterable[Parameter]], joints: Sequence[Joint])
     return {name: (made, made.model_validate({})) for name, made in sections.items()}
 
 
-def _drive_section(kind: str, mechanism: Mechanism) -> type[Section]:
+def _drive_parameters(kind: DriveKind, mechanism: Mechanism) -> tuple[Parameter, ...]:
+    """All numbers that a drive of one kind may have and the plant too, whether or not they are zero."""
+    return (*DRIVES[kind].parameters(mechanism), *friction_parameters(kind))
+
+
+def _drive_section(kind: DriveKind, mechanism: Mechanism) -> type[Section]:
     """[drive] of one kind; only springs split the system into a slow and a fast one."""
-    parameters = DRIVES[kind].parameters(mechanism)
+    parameters = _drive_parameters(kind, mechanism)
     split = (EPSILON,) if kind == "elastic" else ()
     return _section("drive", {"kind": (Literal[kind], kind), **_numbers((*parameters, *split), mechanism.joints)})
 
@@ -469,6 +505,16 @@ def _reference_sines(mechanism: Mechanism) -> type[Section]:
         default = made.model_validate({"offset": mechanism.reference_offset[i], "terms": terms})
         fields[joint.name] = (made, default)
     return _section("sine", fields)
+
+
+def _disturbance_sines(joints: Sequence[Joint]) -> dict[str, Any]:
+    """A constant force and sine terms for each joint; none for one that is not given."""
+    fields: dict[str, Any] = {}
+    for joint in joints:
+        offset = (Annotated[float, number(joint.force)], 0.0)
+        made = _section(joint.name, {"offset": offset, "terms": (_terms(joint.force), [])})
+        fields[joint.name] = (made, made.model_validate({}))
+    return fields
 
 
 def _reference_polynomials(mechanism: Mechanism) -> type[Section]:

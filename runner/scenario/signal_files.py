@@ -17,7 +17,7 @@ from springline.runner.scenario.schema import DOORS
 
 FOLDER = "tables"
 
-_SECTIONS = ("reference", "base_motion")
+_SECTIONS = ("reference", "base_motion", "disturbance")
 
 
 @dataclass(frozen=True, slots=True)

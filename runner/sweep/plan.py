@@ -26,6 +26,7 @@ from springline.runner.scenario import (
     Record,
     Scenario,
     UserClass,
+    absent_at_zero,
     canonical_reference,
     given_text,
     names_file,
@@ -106,7 +107,8 @@ class Plan:
         """`chunk`: runs per chunk, 0 for what the sweep says or what fits it."""
         self.sweep = sweep
         self.runs = sweep.samples * math.prod(len(axis.values) for axis in sweep.axes if axis.kind == "each")
-        self._numeric = sweep.scenario.numeric_keys()
+        grouping = {axis.key for axis in sweep.axes if _switches(axis.key, axis.reach(sweep.axes))}
+        self._numeric = {k: v for k, v in sweep.scenario.numeric_keys().items() if k not in grouping}
         self._free = [axis for axis in sweep.axes if axis.kind != "tie"]
         self._outer = [axis for axis in self._free if self._groups_runs(axis)]
         self._inner = [axis for axis in self._free if axis not in self._outer]
@@ -396,6 +398,11 @@ class Plan:
                 value, place = at[axis.tie or axis.key]
                 probe[axis.key] = float(_tied_value(axis, value, place) if axis.kind == "tie" else value)
         return probe
+
+
+def _switches(key: str, numbers: tuple[float, ...]) -> bool:
+    """Whether a key takes something out of the structure in some runs and not in others."""
+    return absent_at_zero(key) and 0.0 in numbers and any(numbers)
 
 
 def _tied_value(axis: Axis, value: Any, place: int) -> Any:

@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 WORST = 10
 
-_OUTCOMES = STATUS[:3]
+_OUTCOMES = tuple(status for status in STATUS if status != "stopped")
 _CHATTERING = "chattering"
 _SHOWN = 20_000  # rows that figures are drawn from
 
@@ -63,7 +63,7 @@ class Summary:
 
     @property
     def stopped(self) -> int:
-        """Runs that diverged or left their bounds."""
+        """Runs that diverged or left their bounds or limits."""
         return sum(group[status] for group in self.outcomes.values() for status in _OUTCOMES if status != "ok")
 
 
@@ -195,7 +195,16 @@ def summary_tables(summary: Summary, keys: Sequence[str]) -> tuple[Rows, Rows, R
 
 def _outcome_rows(summary: Summary) -> Rows:
     """How many runs of each group ended how."""
-    header = ["group", "runs", "ok", "of these chattering", "diverged", "out of bounds", "stopped early"]
+    header = [
+        "group",
+        "runs",
+        "ok",
+        "of these chattering",
+        "diverged",
+        "out of bounds",
+        "out of limits",
+        "stopped early",
+    ]
     rows = []
     for name, counts in summary.outcomes.items():
         total = sum(counts[outcome] for outcome in _OUTCOMES)

@@ -39,6 +39,7 @@ from springline.codegen.numbers import double
 from springline.runner.files import InputError, Problem, read_toml, unknown, value_text
 from springline.runner.scenario import (
     Scenario,
+    absent_at_zero,
     draft_scenario,
     expect_kind,
     file_text,
@@ -79,6 +80,14 @@ class Axis:
     points: int = 0
     tie: str = ""
     factor: float = 1.0
+
+    def reach(self, axes: Sequence[Axis]) -> tuple[float, ...]:
+        """Numbers that the axis takes: all of a list's, of a range both ends but zero; the others are for a tie."""
+        source = next((axis for axis in axes if axis.key == self.tie), self)
+        if self.values or source.values:
+            found = self.values or tuple(self.factor * value for value in source.values if _is_number(value))
+            return tuple(float(value) for value in found if _is_number(value))
+        return tuple(self.factor * value for value in source.span if value)
 
     def as_toml(self) -> dict[str, Any]:
         """The axis as a sweep file has it."""
@@ -203,6 +212,8 @@ class _Reader:
         samples = self._samples(document, cast(Method, method), axes)
         if self._problems or scenario is None:
             raise InputError(*self._problems)
+        reached = {axis.key: axis.reach(axes) for axis in axes if absent_at_zero(axis.key)}
+        scenario = scenario.including({key: numbers for key, numbers in reached.items() if 0.0 not in numbers})
         return Sweep(self._name, scenario, cast(Method, method), samples, seed, chunk, keep, tuple(axes))
 
     def _expect_effect(self, axes: Sequence[Axis]) -> None:

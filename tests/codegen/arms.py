@@ -25,9 +25,11 @@ def values_of(structure: Structure) -> np.ndarray:
     given |= {f"base_motion.{key}.0.omega": 5.0 for key in ("surge", "sway", "yaw")}
     given |= {f"base_motion.mount.{i}": value for i, value in enumerate((4.0, 2.0, -1.5))}
     given |= {f"base_motion.mount_rpy.{i}": value for i, value in enumerate((0.2, -0.1, 0.7))}
+    slots = program(structure).system.slots
+    given |= {slot.key: 0.3 for slot in slots if slot.key.split(".")[1] in structure.friction}
     for i, joint in enumerate(arm.joints):
         given |= {f"initial.q.{i}": arm.start_position[i], f"reference.{joint.name}.offset": arm.reference_offset[i]}
         for k, term in enumerate(arm.reference_terms[i]):
             stem = f"reference.{joint.name}.terms.{k}"
             given |= {f"{stem}.amplitude": term.amplitude, f"{stem}.omega": term.omega, f"{stem}.phase": term.phase}
-    return np.array([given.get(slot.key, slot.default) for slot in program(structure).system.slots])
+    return np.array([given.get(slot.key, slot.default) for slot in slots])

@@ -21,6 +21,8 @@ from springline.codegen.export.fmu import Settings, fmu
 from springline.codegen.export.fmu import archive as fmu_module
 from springline.codegen.files import write_tree
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
+from springline.codegen.program import program
+from springline.model.drive import FRICTION
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS
 from springline.model.quantities import Q1, Quantity
@@ -150,20 +152,21 @@ def test_a_command_is_delayed_before_the_motors_act_on_it() -> None:
         np.testing.assert_array_equal(plant(w, x, 2.0, values), ideal(w, x, 0.8 * (2.0 + 0.5), values))
 
 
+ALL_FRICTION = tuple(item.name for item in FRICTION)
 # Arms, drives and integrators by turns; dop853 for what keeps slopes and has many nodes.
 OTHERS = [
-    ("one_link", "elastic", "rk4"),
-    ("one_link", "rigid", "dop853"),
-    ("three_links", "elastic", "dop853"),
-    ("three_links", "rigid", "midpoint"),
+    ("one_link", "elastic", "rk4", ALL_FRICTION),
+    ("one_link", "rigid", "dop853", ()),
+    ("three_links", "elastic", "dop853", ()),
+    ("three_links", "rigid", "midpoint", ALL_FRICTION[1:]),
 ]
 
 
-@pytest.mark.parametrize(("mechanism", "drive", "integrator"), OTHERS)
+@pytest.mark.parametrize(("mechanism", "drive", "integrator", "friction"), OTHERS)
 def test_other_arms_have_the_same_bits_in_both_engines_and_in_fmus(
-    mechanism: str, drive: str, integrator: str, tmp_path: Path
+    mechanism: str, drive: str, integrator: str, friction: tuple[str, ...], tmp_path: Path
 ) -> None:
-    structure = structure_of(mechanism, drive=drive, integrator=integrator)
+    structure = structure_of(mechanism, drive=drive, integrator=integrator, friction=friction)
     for sampled, version in ((True, 2), (False, 3)):
         rows = rows_of(structure, sampled, width=4, groups=2)
         assert np.isfinite(rows).all()
@@ -172,11 +175,11 @@ def test_other_arms_have_the_same_bits_in_both_engines_and_in_fmus(
         np.testing.assert_array_equal(fmu_rows(structure, sampled, version, tmp_path), expected)
 
 
-@pytest.mark.parametrize(("mechanism", "drive", "integrator"), OTHERS)
+@pytest.mark.parametrize(("mechanism", "drive", "integrator", "friction"), OTHERS)
 def test_other_arms_are_exported_as_c_that_checks_itself(
-    mechanism: str, drive: str, integrator: str, tmp_path: Path
+    mechanism: str, drive: str, integrator: str, friction: tuple[str, ...], tmp_path: Path
 ) -> None:
-    structure = structure_of(mechanism, drive=drive, integrator=integrator)
+    structure = structure_of(mechanism, drive=drive, integrator=integrator, friction=friction)
     folder = tmp_path / "c"
     write_tree(folder, *generate_files(bind(structure, values_of(structure), tunable=["control"], prefix="other_arm")))
     includes = [f"-I{folder}/include", f"-I{folder}/src"]

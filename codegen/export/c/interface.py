@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from springline.codegen.export import Body, Export, ScalarPrinter, port_entries
 from springline.codegen.program import literal
 from springline.model.parameters import Slot
-from springline.model.quantities import A_LIMITED, REFERENCE, SATURATED, E, Quantity, U, entries
+from springline.model.quantities import A_LIMITED, DISTURBANCE, REFERENCE, SATURATED, E, Quantity, U, entries
 
 _MATH_STACK = 160  # bytes below the deepest elementary function, as measured on Cortex-M7
 
@@ -42,12 +42,17 @@ class JointLimits:
 
 
 class TypedInterface:
-    """Structures and function bodies of an export's C interface."""
+    """Structures and function bodies of an export's C interface.
 
-    def __init__(self, export: Export) -> None:
+    tip  where the arm's end is and how fast it moves, into tip[0], tip[1], …; None unless asked for, or without one
+    """
+
+    def __init__(self, export: Export, *, with_tip: bool = False) -> None:
         self.export = export
         system = export.system
         names = ["measure", "control", "plant", "start", "signals"]
+        shows_tip = with_tip and system.tip is not None
+        names += ["tip"] if shows_tip else []
         remembers = bool(system.memory)
         names += ["rates"] if remembers else []
         self._printer = ScalarPrinter(export, [system.function(name) for name in names], hoist=True)
@@ -69,7 +74,7 @@ class TypedInterface:
             "command": declared(U),
             "diagnostics": (*numbers, *declared(*limits, integer=True)),
             "state": declared(*system.drive.state),
-            "base": declared(*system.base_motion),
+            "base": declared(*system.base_motion, *system.forces),
         }
         if remembers:
             self.structures["memory"] = declared(*system.controller_states)
@@ -87,6 +92,7 @@ class TypedInterface:
         seen += [f"ahead->{f.name}" for f in self.structures.get("memory", ())]
         seeing = dict.fromkeys(("q1d", "dq1d", "ddq1d"), "reference->") | {"x": "measurement->", "z": _MEMORY}
         measured = {field.name for field in self.structures["measurement"]}
+        around = dict.fromkeys(("b", "db", "ddb", DISTURBANCE.name), "base->")
         self.bodies: dict[str, Body] = {
             "measure": self._printer.body(
                 "measure",
@@ -100,12 +106,15 @@ class TypedInterface:
             ),
             "plant": self._printer.body(
                 "plant",
-                self._load({"b": "base->", "db": "base->", "ddb": "base->", "u": "command->"}, x_is_array=True),
+                self._load(around | {"u": "command->"}, x_is_array=True),
                 [f"dx[{k}]" for k in range(len(state))],
             ),
             "start": self._printer.body("start", self._load({"t": ""}), [f"state->{f.name}" for f in state]),
             "signals": self._printer.body("signals", self._load({"t": ""}), signals),
         }
+        targets = [f"tip[{k}]" for k in range(len(system.observed))]
+        load = self._load(around, x_is_array=True)
+        self.tip: Body | None = self._printer.body("tip", load, targets) if shows_tip else None
         self.rates: Body | None = None
         """Rates of the controller's states, into dz[0], dz[1], …: for those that integrate them with the plant."""
         if remembers:
@@ -180,7 +189,11 @@ class TypedInterface:
     def missing_tables(self) -> str:
         """A sentence on the signals that come from tables, which are not exported; empty where there are none."""
         structure = self.export.system.structure
-        signals = (("reference", structure.reference), ("base motion", structure.base_motion))
+        signals = (
+            ("reference", structure.reference),
+            ("base motion", structure.base_motion),
+            ("disturbance", structure.disturbance),
+        )
         tables = [name for name, shape in signals if shape.kind == "table"]
         if not tables or self.export.tables:
             return ""

@@ -68,6 +68,7 @@ def _values(export: Export, interface: TypedInterface) -> dict[str, Any]:
         "memory": interface.structures.get("memory", ()),
         "memory_start": [constant(value) for value in system.z_start],
         "sliding": bool(system.sliding),
+        "disturbed": bool(system.forces),
         "has_law": system.controller.law is not None,
         "command_parts": [part.name for part in system.command_parts],
         "tableau": system.tableau,

@@ -180,7 +180,7 @@ def _plant_rows(interface: TypedInterface, model: _Model) -> Iterator[list[float
     system, draw = interface.export.system, _Draw()
     n, coordinates = system.n, system.base.b.numel()
     for _ in range(PLANT_VECTORS):
-        base = np.array([value for bound in (0.5, 1.0, 2.0) for value in draw.uniform(bound, coordinates)], model.dtype)
+        motion = [np.array(draw.uniform(bound, coordinates), model.dtype) for bound in (0.5, 1.0, 2.0)]
         q1 = draw.uniform(2.0, n)
         stretch = [value / 1024 for value in draw.uniform(4.0, n)]
         x = np.array(
@@ -190,13 +190,14 @@ def _plant_rows(interface: TypedInterface, model: _Model) -> Iterator[list[float
             model.dtype,
         )
         u = np.array(draw.uniform(2048.0, n), model.dtype)
-        yield [*base, *x, *u, *_runge_kutta(system.tableau, model, base, x, u)]
+        motion += [np.array(draw.uniform(256.0, n), model.dtype)] if system.forces else []
+        yield [*np.concatenate(motion), *x, *u, *_runge_kutta(system.tableau, model, motion, x, u)]
 
 
-def _runge_kutta(tableau: Tableau, model: _Model, base: Numbers, x: Numbers, u: Numbers) -> Numbers:
-    """One step, operation by operation as the C does it."""
+def _runge_kutta(tableau: Tableau, model: _Model, motion: Sequence[Numbers], x: Numbers, u: Numbers) -> Numbers:
+    """One step, operation by operation as the C does it; `motion` of the base, and forces behind it."""
     real = model.dtype
-    h, motion = real(TIME_STEP), np.split(base, 3)
+    h = real(TIME_STEP)
     slopes: list[Numbers] = []
     at = after = x
     for update in updates(tableau):

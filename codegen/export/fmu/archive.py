@@ -9,6 +9,7 @@ import sys
 import uuid
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib import resources
 from typing import Literal
@@ -25,7 +26,7 @@ from springline.codegen.export.fmu.source import sources
 from springline.codegen.export.fmu.variables import PARTS, Part, interface, part_parameters
 from springline.codegen.kernel import toolchain
 from springline.codegen.program import SignalTable
-from springline.model.structure import Structure
+from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 
 __all__ = ["PARTS", "FmiVersion", "Part", "Settings", "fmu"]
@@ -57,9 +58,12 @@ def fmu(
     tables      the data of the structure's table signals, in the order of System.tables
     tunable     parameters of the part that may be set: slot keys or what stands for several; the rest are constants
     The same arguments give the same bytes on the same machine.
+    The forces that disturb the links are inputs of plant and loop where the structure has none.
     Raises ValueError for a value out of its bounds, an unknown name or an unusable identifier; ToolchainError without
     a C compiler or for a machine whose name FMI does not know.
     """
+    if part != "controller" and structure.disturbance.kind == "none":
+        structure = replace(structure, disturbance=SignalShape("input"))
     system = System(structure)
     if len(tables) != len(system.tables):
         raise ValueError(f"{len(tables)} tables given, the system has {len(system.tables)}")
@@ -67,7 +71,7 @@ def fmu(
     keys = [system.slots[i].key for i in part_parameters(system, part) if i in set(wanted)]
     needed = () if part == "controller" else tables
     export = bind(structure, values, tunable=keys, prefix=identifier, tables=needed, period=settings.sample)
-    typed = TypedInterface(export)
+    typed = TypedInterface(export, with_tip=part != "controller")
     shown = interface(export, typed, part, sampled=part == "controller" or settings.period > 0.0)
     code = sources(export, typed, shown, settings, version)
     describe = partial(

@@ -95,17 +95,18 @@ def model_description(
     for reference, variable in enumerate(interface.variables):
         (_variable_2 if two else _variable_3)(variables, reference, variable)
     structure = ET.SubElement(root, "ModelStructure")
-    # The command belongs to the inputs of its own time; the plant's outputs are states.
-    inputs = interface.of("input") if interface.part == "controller" else []
+    depends = interface.depends
     if two:
         outputs, unknowns = (ET.SubElement(structure, tag) for tag in ("Outputs", "InitialUnknowns"))
         for reference in interface.of("output"):
             index = {"index": str(reference + 1)}
-            ET.SubElement(outputs, "Unknown", index | {"dependencies": _list(k + 1 for k in inputs)})
+            ET.SubElement(outputs, "Unknown", index | {"dependencies": _list(k + 1 for k in depends[reference])})
             ET.SubElement(unknowns, "Unknown", index)
     else:
         for reference in interface.of("output"):
-            ET.SubElement(structure, "Output", {"valueReference": str(reference), "dependencies": _list(inputs)})
+            ET.SubElement(
+                structure, "Output", {"valueReference": str(reference), "dependencies": _list(depends[reference])}
+            )
         for reference in interface.of("output"):
             ET.SubElement(structure, "InitialUnknown", {"valueReference": str(reference)})
     return _xml(root)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from springline.codegen.export import Export, provenance
 from springline.codegen.export.fmu.settings import FmiVersion, Settings
-from springline.codegen.export.fmu.variables import NO_LIMIT, Interface, base_is_input
+from springline.codegen.export.fmu.variables import NO_LIMIT, Interface, base_is_input, force_is_input
 from springline.codegen.files import render
 
 _CAUSALITIES = {
@@ -47,6 +47,8 @@ def document(
         sampled=settings.period > 0.0,
         memory="memory" in interface.blocks,
         base_is_input=base_is_input(export.system, interface.part),
+        force_is_input=force_is_input(export.system, interface.part),
+        limits=settings.limits,
         unlimited=any(variable.bounds.infinite for variable in variables),
         no_limit=f"{NO_LIMIT:g}",
         sections=[

@@ -17,6 +17,7 @@ class Settings:
     step      of the plant's integrator, s
     period    sample period of the control, a whole number of steps, s; 0 for continuous control
     bound     largest |x_i| of the plant and |z_i| of the controller, SI units
+    limits    least and greatest q1 of each joint, which the plant may not pass; () for none
     until     where the scenario's signals end, s
     """
 
@@ -25,6 +26,7 @@ class Settings:
     period: float = 0.0
     bound: float = 1e6
     until: float = math.inf
+    limits: tuple[tuple[float, float], ...] = ()
 
     @property
     def hold(self) -> int:

@@ -9,7 +9,14 @@ from typing import Any
 from springline.codegen.export import Export, check_files, provenance
 from springline.codegen.export.c import TypedInterface, text_files
 from springline.codegen.export.fmu.settings import FmiVersion, Settings
-from springline.codegen.export.fmu.variables import NO_LIMIT, Interface, Variable, base_is_input
+from springline.codegen.export.fmu.variables import (
+    NO_LIMIT,
+    Interface,
+    Variable,
+    base_is_input,
+    force_is_input,
+    structures_of,
+)
 from springline.codegen.files import render
 from springline.codegen.program import constant_expression, scalar_slopes, scalar_stages
 
@@ -54,13 +61,13 @@ def _values(export: Export, typed: TypedInterface, interface: Interface, setting
         until = math.inf
     else:
         grid, until = settings.step, settings.until
-    reads, writes = _copies(interface, inside=not base_is_input(system, part))
+    reads, writes = _copies(interface)
     return {
         "prefix": export.prefix,
         "PREFIX": export.prefix.upper(),
         "provenance": provenance(export),
         "part": part,
-        "structures": typed.structures,
+        "structures": structures_of(typed),
         "tunable": export.tunable_slots,
         "variables": [_row(variable) for variable in interface.variables],
         "blocks": blocks,
@@ -70,6 +77,9 @@ def _values(export: Export, typed: TypedInterface, interface: Interface, setting
         "no_limit": constant_expression(NO_LIMIT),
         "hold": settings.hold,
         "base_is_input": base_is_input(system, part),
+        "force_is_input": force_is_input(system, part),
+        "tip": typed.tip,
+        "limits": [[constant_expression(value) for value in pair] for pair in settings.limits],
         "memory": len(system.memory) if "memory" in blocks else 0,
         "current": (1 + len(system.sliding)) * system.n,
         "reads": reads,
@@ -96,18 +106,20 @@ def _row(variable: Variable) -> dict[str, Any]:
     }
 
 
-def _copies(interface: Interface, *, inside: bool) -> tuple[list[str], list[str]]:
-    """Structures of the C interface that this part reads from blocks of values, and that it writes to them.
-
-    inside  whether the base's motion is the scenario's
-    """
-    base = [] if inside else ["base"]
-    reads = {"controller": ["reference", "measurement"], "plant": ["command", "state", *base], "loop": ["state", *base]}
-    base = ["base"] if inside else []
+def _copies(interface: Interface) -> tuple[list[str], list[str]]:
+    """Structures of the C interface that this part reads from blocks of values, and that it writes to them."""
+    around = [name for name in ("base", "disturbance") if name in interface.blocks]
+    given = [name for name in around if interface.variables[interface.blocks[name]].causality == "input"]
+    shown = [name for name in around if name not in given]
+    reads = {
+        "controller": ["reference", "measurement"],
+        "plant": ["command", "state", *given],
+        "loop": ["state", *given],
+    }
     writes = {
         "controller": ["command", "diagnostics"],
-        "plant": ["state", *base],
-        "loop": ["reference", "command", "diagnostics", "state", *base],
+        "plant": ["state", *shown],
+        "loop": ["reference", "command", "diagnostics", "state", *shown],
     }
     memory = ["memory"] if "memory" in interface.blocks else []
     return [*reads[interface.part], *memory], [*writes[interface.part], *memory]

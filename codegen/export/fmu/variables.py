@@ -12,6 +12,7 @@ import casadi as ca
 from springline.codegen.export import Export
 from springline.codegen.export.c import Field, TypedInterface
 from springline.model.parameters import REAL, Bounds
+from springline.model.quantities import TIP, TIP_RATE, entries
 from springline.model.system import System
 
 Part = Literal["controller", "plant", "loop"]
@@ -21,6 +22,8 @@ PARTS: tuple[Part, ...] = ("controller", "plant", "loop")
 
 NO_LIMIT = 1e300
 """How an FMU writes infinity, and from where on it reads it: FMI's XML has none, and its importers cannot read one."""
+
+_SEEN_FROM_EARTH = frozenset(item.name for item in (*TIP, *TIP_RATE) if item.name.endswith("_inertial"))
 
 _LEAST = 1e-300  # stands for the least number above 0, which is denormal and not every importer's to read
 
@@ -76,6 +79,7 @@ class Interface:
     """Variables of one part.
 
     variables  by value reference; 0 is time
+    base       how many variables say how the base moves
     blocks     name of a structure of the C interface (or "parameters") -> value reference of its first entry; entries
                follow in the structure's order
     """
@@ -83,6 +87,21 @@ class Interface:
     part: Part
     variables: tuple[Variable, ...]
     blocks: dict[str, int]
+    base: int = 0
+
+    @property
+    def depends(self) -> dict[int, list[int]]:
+        """Value reference of each output -> those of the inputs of its own time that it depends on.
+
+        The command depends on all; of the plant, whose other outputs are states, the tip as seen from the earth depends
+        on the base.
+        """
+        inputs = self.of("input")
+        if self.part == "controller":
+            return dict.fromkeys(self.of("output"), inputs)
+        seen = range(self.blocks["base"], self.blocks["base"] + self.base) if "base" in self.blocks else ()
+        moving = [k for k in inputs if k in seen]
+        return {k: moving if self.variables[k].name in _SEEN_FROM_EARTH else [] for k in self.of("output")}
 
     def of(self, *causalities: Causality) -> list[int]:
         """Value references of the variables with one of these causalities."""
@@ -94,13 +113,27 @@ def base_is_input(system: System, part: Part) -> bool:
     return part != "controller" and system.structure.base_motion.kind == "none"
 
 
+def force_is_input(system: System, part: Part) -> bool:
+    """Whether the importer disturbs the links: where the scenario does not."""
+    return part != "controller" and system.structure.disturbance.kind == "input"
+
+
+def structures_of(typed: TypedInterface) -> dict[str, tuple[Field, ...]]:
+    """The structures of the C interface, that of the base in two, "base" and "disturbance"; and what the tip is."""
+    system = typed.export.system
+    base = typed.structures["base"]
+    motion = len(base) - len(entries(system.forces, system.joints))
+    tip = tuple(Field(entry.name, entry.unit, entry.meaning) for entry in entries(system.observed, system.joints))
+    return {**typed.structures, "base": base[:motion], "disturbance": base[motion:], "tip": tip if typed.tip else ()}
+
+
 def part_parameters(system: System, part: Part) -> tuple[int, ...]:
     """Indices of the slots that a part depends on, ascending."""
     names = ("control", "rates", "update") if system.memory else ("control",)
     control = {i for name in names for i in _read(system, name)}
     if part == "controller":
         return tuple(sorted(control))
-    used = {*_read(system, "plant"), *_read(system, "start")}
+    used = {*_read(system, "plant"), *_read(system, "start"), *(_read(system, "tip") if system.observed else ())}
     if part == "loop":
         used |= control
     signals = {
@@ -125,16 +158,23 @@ def interface(export: Export, typed: TypedInterface, part: Part, *, sampled: boo
 
     sampled  whether the controller's states change at samples only
     """
-    outside = base_is_input(export.system, part)
+    known = structures_of(typed)
+    outside = {
+        "base": base_is_input(export.system, part),
+        "disturbance": force_is_input(export.system, part),
+    }
+    given = [name for name, is_input in outside.items() if is_input and known[name]]
+    shown = [name for name, is_input in outside.items() if not is_input and known[name]]
+    shown += ["tip"] if known["tip"] else []
     inputs: dict[Part, Sequence[str]] = {
         "controller": ("reference", "measurement"),
-        "plant": ("command", *(["base"] if outside else [])),
-        "loop": ("base",) if outside else (),
+        "plant": ("command", *given),
+        "loop": given,
     }
     outputs: dict[Part, Sequence[str]] = {
         "controller": ("command", "diagnostics"),
-        "plant": ("state", *([] if outside else ["base"])),
-        "loop": ("state", "reference", "command", "diagnostics", *([] if outside else ["base"])),
+        "plant": ("state", *shown),
+        "loop": ("state", "reference", "command", "diagnostics", *shown),
     }
     # A controller's states stand behind the plant's: what is integrated is one piece.
     last = {"controller": "diagnostics", "plant": "", "loop": "state"}[part]
@@ -148,11 +188,11 @@ def interface(export: Export, typed: TypedInterface, part: Part, *, sampled: boo
     for causality, structures in groups:
         for structure in structures:
             blocks[structure] = len(variables)
-            variables += [_signal(field, causality) for field in typed.structures[structure]]
+            variables += [_signal(field, causality) for field in known[structure]]
             if structure == last and "memory" in typed.structures:
                 blocks["memory"] = len(variables)
                 variables += [_signal(field, "local", sampled=sampled) for field in typed.structures["memory"]]
-    return Interface(part, tuple(variables), blocks)
+    return Interface(part, tuple(variables), blocks, len(known["base"]))
 
 
 def _signal(field: Field, causality: Causality, *, sampled: bool = False) -> Variable:

@@ -127,6 +127,7 @@ def _settings(scenario: Scenario) -> Settings:
         step=scenario.step,
         period=float(control["period"]) if control["mode"] == "sampled" else 0.0,
         bound=scenario.bound,
+        limits=scenario.limits,
         until=min((table.end for table in ending), default=math.inf),
     )
 

@@ -89,7 +89,7 @@ def parameters() -> list[Row]:
 
     What differs from joint to joint has a list of defaults, and of units.
     """
-    from springline.model.drive import EPSILON
+    from springline.model.drive import EPSILON, friction_parameters
     from springline.model.mechanisms import MECHANISMS
     from springline.model.system import control_parameters
 
@@ -97,7 +97,7 @@ def parameters() -> list[Row]:
     for mechanism in MECHANISMS.values():
         tables = {
             "mechanism": mechanism.parameters,
-            "drive": (*mechanism.motor_inertia, *mechanism.stiffness, EPSILON),
+            "drive": (*mechanism.motor_inertia, *mechanism.stiffness, *friction_parameters("elastic"), EPSILON),
             "control": control_parameters(mechanism),
         }
         for table, declared in tables.items():

@@ -94,7 +94,7 @@ def run(
 
 def _refuse_own_inputs(folder: Path, source: str, scenario: Scenario) -> None:
     """Raise InputError if writing the results would replace the scenario file or a table that it reads."""
-    tables = (scenario.document[name].get("path") for name in ("reference", "base_motion"))
+    tables = (scenario.document[name].get("path") for name in ("reference", "base_motion", "disturbance"))
     inputs = {Path(name).resolve() for name in (source, *tables) if name is not None}
     lost = sorted(str(path) for pattern in OUTPUTS for path in folder.glob(pattern) if path.resolve() in inputs)
     if lost:

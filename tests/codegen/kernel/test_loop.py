@@ -591,9 +591,9 @@ def test_results_beyond_the_memory_are_refused_before_it_is_asked_for(
 ) -> None:
     kernel = compiled(shaken)
     values = values_of(shaken)[None, :]
-    with pytest.raises(ValueError, match=r"output_every is 1: 1 x 4398046511105 trajectory rows .* need 7.04e\+05 GB"):
+    with pytest.raises(ValueError, match=r"output_every is 1: 1 x 4398046511105 trajectory rows .* need 1.13e\+06 GB"):
         kernel.run(values, LoopSettings(2**42, 1e-12, output_every=1))
-    monkeypatch.setattr(kernel_module, "memory", lambda: 8 * 20 * 100)
+    monkeypatch.setattr(kernel_module, "memory", lambda: 8 * 32 * 100)
     assert kernel.run(values, LoopSettings(99, 1e-6, output_every=1)).rows == 100
     with pytest.raises(ValueError, match="101 trajectory rows"):
         kernel.run(values, LoopSettings(100, 1e-6, output_every=1))

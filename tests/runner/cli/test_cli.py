@@ -38,7 +38,7 @@ from springline.runner.run import simulate
 from springline.runner.scenario import load_scenario, packaged_scenarios, packaged_sweeps
 
 MAIN = "from springline.runner.cli import main; main()"
-FIGURES = {"tracking", "error", "force", "sliding", "springs", "steady_state", "base_motion"}
+FIGURES = {"tracking", "error", "force", "sliding", "springs", "steady_state", "base_motion", "tip"}
 SHORT = """\
 [base_motion]
 kind = "sine"

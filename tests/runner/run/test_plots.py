@@ -13,7 +13,7 @@ from springline.runner.report import figure_files, house_style
 from springline.runner.run import Result, run_figures, simulate
 from springline.runner.scenario import Scenario, load_scenario
 
-ALWAYS = {"tracking", "error", "force", "sliding", "springs"}
+ALWAYS = {"tracking", "error", "force", "sliding", "springs", "tip"}
 
 Run = tuple[Scenario, Result]
 

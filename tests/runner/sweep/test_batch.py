@@ -376,7 +376,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_resume(
     assert f"springline batch {sweep} -o {folder} --resume" in done.stderr.replace("\n", " ")
     again = command("batch", sweep, "-o", folder, "--resume", "--no-plot", "--json")
     assert again.exit_code == 0
-    expected = {"group": "all", "ok": 2000, "diverged": 0, "out_of_bounds": 0, "chattering": 0}
+    expected = {"group": "all", "ok": 2000, "diverged": 0, "out_of_bounds": 0, "out_of_limits": 0, "chattering": 0}
     assert json.loads(again.stdout)["rows"] == [expected]
 
 
@@ -679,7 +679,7 @@ def test_chattering_runs_are_counted_and_marked(keys: int, tmp_path: Path, comma
         for row in table
     ]
     assert [row["control.delta"] < 0.02 and row["status"] == "ok" for row in table] == chatter
-    counts = {"ok": 4 * keys, "chattering": 2 * keys, "diverged": 0, "out_of_bounds": 0}
+    counts = {"ok": 4 * keys, "chattering": 2 * keys, "diverged": 0, "out_of_bounds": 0, "out_of_limits": 0}
     assert summary.outcomes["fast = true"] == counts
     assert summary.outcomes["fast = false"]["chattering"] == 0
     assert summary.stopped == 4 * keys

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from springline.codegen.export.fmu import Settings, fmu
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
 from springline.codegen.program import Program, SignalTable
-from springline.model.base import PAPER_COORDINATES
 
 STEP, PERIOD, DURATION = 1e-4, 1e-3, 0.3
 SAMPLED = Settings(duration=DURATION, step=STEP, period=PERIOD)
@@ -109,10 +108,8 @@ Open = Callable[[Path], Client]
 
 
 def columns(of: Program) -> list[str]:
-    """Names of a trajectory's columns after t, in the order of loop.c."""
-    joints = [joint.name for joint in of.system.joints]
-    quantities = ("q1", "dq1", "q2", "dq2", "q1d", "e", "sigma", "U")
-    return [*(f"{q}_{joint}" for q in quantities for joint in joints), *(c.symbol for c in PAPER_COORDINATES)]
+    """Names of a trajectory's columns after t."""
+    return [entry.name for entry in of.system.trajectory[1:]]
 
 
 def own_run(
