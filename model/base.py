@@ -121,11 +121,12 @@ class BaseState:
     @property
     def position(self) -> ca.SX:
         """The base's origin, 3 x 1, m, inertial axes."""
-        return ca.vertcat(0, self.b[0], 0)
+        return ca.vertcat(*(self._of(self.b, key) for key in ("surge", "heave", "sway")))
 
     def on_ship(self, point: ca.SX) -> ca.SX:
-        """A point of the arm's axes in the ship's, 3 x 1, m: the same, for the arm stands at the base's origin."""
-        return point
+        """A point given in the arm's axes, from its foot, in the ship's from her origin; 3 x 1, m."""
+        seen = point if self.mount_rpy is None else turned(*ca.vertsplit(self.mount_rpy)) @ point
+        return seen if self.mount is None else self.mount + seen
 
     @property
     def omega(self) -> ca.SX:

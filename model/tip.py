@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import casadi as ca
 
-from springline.model.base import BaseMotion
+from springline.model.base import BaseState
 
 
-def tip_motion(tip: ca.SX, q: ca.SX, dq: ca.SX, base: BaseMotion) -> ca.SX:
+def tip_motion(tip: ca.SX, q: ca.SX, dq: ca.SX, base: BaseState) -> ca.SX:
     """Position and rate of a point of the arm, 12 x 1, m and m/s, in the order of quantities.TIP and TIP_RATE.
 
     tip  3 x 1, arm axes, of q;  q, dq  n x 1;  entries of q and base.b are symbols

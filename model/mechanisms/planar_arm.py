@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cache
 from typing import ClassVar
 
+import casadi as ca
+
 from springline.model.mechanisms.link import Link
 from springline.model.mechanisms.mechanism import Mechanism
 from springline.model.parameters import NON_NEGATIVE, POSITIVE, Joint, Parameter, Values
@@ -37,6 +39,14 @@ class PlanarArm(Mechanism):
     def of_size(self, size: int) -> Mechanism:
         """The arm with `size` joints."""
         return self if size in (0, len(self.joints)) else _planar_arm(size)
+
+    def tip(self, q: ca.SX, p: Values) -> ca.SX:
+        """The end of the last link."""
+        point, angle = ca.SX.zeros(3), ca.SX(0)
+        for k in range(len(self.joints)):
+            angle = angle + q[k]
+            point = point + p.length[k] * ca.vertcat(ca.cos(angle), ca.sin(angle), 0)
+        return point
 
     def links(self, p: Values) -> list[Link]:
         """A chain; every axis is z, every frame is parallel to the base's at rest."""

@@ -488,7 +488,11 @@ class Scenario:
         name = self.structure().mechanism
         kept = {joint.name for joint in MECHANISMS[name].of_size(size_given(name, {schema.SIZE: size})).joints}
         gone = {joint.name for joint in self.system().joints} - kept
-        return document | spread | {"reference": {k: v for k, v in document["reference"].items() if k not in gone}}
+        by_joint = {
+            table: {key: item for key, item in document[table].items() if key not in gone}
+            for table in ("reference", "disturbance")
+        }
+        return document | spread | by_joint
 
     def to_toml(self, folder: Path | None = None) -> str:
         """The complete scenario as TOML; loading it gives an equal one.
@@ -622,7 +626,9 @@ def _without_equal(value: object) -> Any:
     """A table with one number in place of a list of equal ones."""
     if isinstance(value, dict):
         return {key: _without_equal(item) for key, item in value.items()}
-    return value[0] if isinstance(value, list) and value and all(item == value[0] for item in value) else value
+    if not isinstance(value, list) or not value or isinstance(value[0], list):
+        return value
+    return value[0] if all(item == value[0] for item in value) else value
 
 
 @lru_cache(maxsize=64)

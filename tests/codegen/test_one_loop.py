@@ -21,7 +21,6 @@ from springline.codegen.export.fmu import Settings, fmu
 from springline.codegen.export.fmu import archive as fmu_module
 from springline.codegen.files import write_tree
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
-from springline.codegen.program import program
 from springline.model.drive import FRICTION
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS

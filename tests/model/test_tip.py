@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from springline.model.base import COORDINATES
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import Values
 from springline.model.quantities import TIP, TIP_RATE
-from springline.model.structure import Structure
+from springline.model.structure import SignalShape, Structure
 
 L1, L3 = 0.5, 0.74
 
@@ -37,6 +39,42 @@ def test_position_and_rate_at_random_states(drive, make_model, rng):
         rates = [on_ship(late[0]) - on_ship(early[0]), on_earth(*late) - on_earth(*early)]
         np.testing.assert_allclose(found[6:], np.concatenate(rates) / (2 * h), rtol=0, atol=1e-8)
     assert len(TIP) == len(TIP_RATE) == 6
+
+
+def test_on_a_ship_that_moves_in_all_six(make_model, rng):
+    """Seen from a foot that is mounted elsewhere, turned: SciPy's rotations, and rates as differences."""
+    shape = SignalShape("sine", (1,) * 6)
+    model, h = make_model(Structure(base_motion=shape, mount=True, mount_rpy=True)), 1e-5
+    keys = [item.key for item in COORDINATES]
+    foot, rpy = np.array([4.0, 2.0, -1.5]), (0.2, -0.1, 0.7)
+    numbers = {f"base_motion.mount.{i}": v for i, v in enumerate(foot)}
+    p = model.p(numbers | {f"base_motion.mount_rpy.{i}": v for i, v in enumerate(rpy)})
+
+    def turned(roll, pitch, yaw):
+        return Rotation.from_euler("YZX", [yaw, pitch, roll]).as_matrix()
+
+    def seen(q, b):
+        at = dict(zip(keys, b, strict=True))
+        ship = foot + turned(*rpy) @ on_ship(q)
+        along = np.array([at["surge"], at["heave"], at["sway"]])
+        return np.concatenate([ship, along + turned(at["roll"], at["pitch"], at["yaw"]) @ ship])
+
+    for _ in range(100):
+        x, (b, db) = rng.uniform(-2, 2, 8), rng.uniform(-1, 1, (2, 6))
+        found = model("tip", b, db, x, p=p)
+        np.testing.assert_allclose(found[:6], seen(x[:2], b), rtol=0, atol=1e-13)
+        rates = (seen(x[:2] + h * x[2:4], b + h * db) - seen(x[:2] - h * x[2:4], b - h * db)) / (2 * h)
+        np.testing.assert_allclose(found[6:], rates, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("n", [1, 3, 7])
+def test_a_planar_arm_ends_at_its_last_links_end(make_model, n):
+    structure = Structure(mechanism="planar_arm", size=n, reference=SignalShape("sine", (0,) * n))
+    model, still = make_model(structure), np.zeros(3)
+    q = np.linspace(0.3, -0.5, n)
+    angles = np.cumsum(q)
+    found = model("tip", still, still, np.concatenate([q, np.zeros(3 * n)]))
+    np.testing.assert_allclose(found[:3], [0.5 * np.cos(angles).sum(), 0.5 * np.sin(angles).sum(), 0.0], atol=1e-14)
 
 
 def test_it_is_the_plants_arm_that_has_it(make_model):
