@@ -75,7 +75,9 @@ def _made_up_effects() -> Iterator[None]:
         del EFFECTS[effect.name]
 
 
-def rows_of(structure: Structure, sampled: bool, every: int = HOLD, **options: Any) -> np.ndarray:
+def rows_of(
+    structure: Structure, sampled: bool, every: int = HOLD, values: np.ndarray | None = None, **options: Any
+) -> np.ndarray:
     loop = kernel(KernelSpec(structure, sampled, options=KernelOptions(flags=QUICK, **options)))
     settings = LoopSettings(STEPS, STEP, hold=HOLD, output_every=every)
     runs = loop.run(values_of(structure)[None], settings)
@@ -85,14 +87,17 @@ def rows_of(structure: Structure, sampled: bool, every: int = HOLD, **options: A
 
 def names_of(structure: Structure) -> list[str]:
     """Columns of the state, then of the command."""
-    arm = MECHANISMS[structure.mechanism]
+    arm = MECHANISMS[structure.mechanism].of_size(structure.size)
     state = ("q1", "dq1") if structure.drive == "rigid" else ("q1", "dq1", "q2", "dq2")
     return [f"{quantity}_{joint.name}" for quantity in (*state, "U") for joint in arm.joints]
 
 
-def fmu_rows(structure: Structure, sampled: bool, version: int, folder: Path) -> np.ndarray:
+def fmu_rows(
+    structure: Structure, sampled: bool, version: int, folder: Path, values: np.ndarray | None = None
+) -> np.ndarray:
     settings = Settings(duration=STEPS * STEP, step=STEP, period=HOLD * STEP if sampled else 0.0)
-    content = fmu(structure, values_of(structure), settings, part="loop", version=version, identifier="arm", name="arm")
+    values = values_of(structure) if values is None else values
+    content = fmu(structure, values, settings, part="loop", version=version, identifier="arm", name="arm")
     path = folder / f"arm{version}{int(sampled)}.fmu"
     path.write_bytes(content)
     client = Client(path, folder).start()
@@ -104,9 +109,10 @@ def fmu_rows(structure: Structure, sampled: bool, version: int, folder: Path) ->
     return np.array(rows)
 
 
-def exported_rows(structure: Structure, folder: Path) -> np.ndarray:
+def exported_rows(structure: Structure, folder: Path, values: np.ndarray | None = None) -> np.ndarray:
     """What main.c prints: the exported step and plant step under sampled control."""
-    write_tree(folder / "c", *generate_files(bind(structure, values_of(structure))))
+    values = values_of(structure) if values is None else values
+    write_tree(folder / "c", *generate_files(bind(structure, values)))
     program = folder / "main"
     source = folder / "c"
     subprocess.run(
@@ -116,13 +122,13 @@ def exported_rows(structure: Structure, folder: Path) -> np.ndarray:
     )  # fmt: skip
     printed = subprocess.run([program, "1"], capture_output=True, text=True, check=True).stdout.splitlines()
     header, rows = printed[0].split(","), [[float(word) for word in line.split(",")] for line in printed[1:]]
-    joints = [joint.name for joint in MECHANISMS[structure.mechanism].joints]
+    joints = [joint.name for joint in MECHANISMS[structure.mechanism].of_size(structure.size).joints]
     wanted = [header.index(f"{quantity}_{joint}") for quantity in ("q1", "U") for joint in joints]
     return np.array(rows)[:, wanted]
 
 
 def of_state_and_command(structure: Structure, rows: np.ndarray) -> np.ndarray:
-    n = len(MECHANISMS[structure.mechanism].joints)
+    n = len(MECHANISMS[structure.mechanism].of_size(structure.size).joints)
     states = (2 if structure.drive == "rigid" else 4) * n
     return np.hstack([rows[:, 1 : 1 + states], rows[:, 1 + states + 3 * n : 1 + states + 4 * n]])
 
@@ -236,6 +242,60 @@ def test_exported_c_of_a_ship_has_what_moves_and_checks_itself(tmp_path: Path) -
     checked = [tmp_path / "check", folder / "test_vectors.txt"]
     done = subprocess.run(checked, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
+
+
+@settings(max_examples=3, suppress_health_check=[HealthCheck.function_scoped_fixture], phases=[Phase.generate])
+@given(
+    kinds=st.text("rp", min_size=1, max_size=5),
+    frames=st.sampled_from(["generic", "quarter"]),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_any_chain_on_a_ship_is_the_same_everywhere(
+    kinds: str, frames: str, seed: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Lanes, CasADi's C, its virtual machine, the exported plant step and an FMU, with friction and forces."""
+    arm, folder = chain(kinds, frames), tmp_path_factory.mktemp("chain")
+    arm.name = f"chain_{kinds}_{frames}"  # kernels and programs are known by the structure, so by the name
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setitem(MECHANISMS, arm.name, arm)
+        pushed = SignalShape("sine", (1,) * len(kinds))
+        structure = structure_of(arm.name, friction=ALL_FRICTION, disturbance=pushed, **SHIP)
+        numbers = numbers_for(len(kinds), np.random.default_rng(seed))
+        values = values_of(structure, {f"{table}.{k}": v for k, v in numbers.items() for table in ("plant", "mechanism")})
+        rows = rows_of(structure, True, values=values, width=4, groups=2)
+        assert np.isfinite(rows).all()
+        np.testing.assert_array_equal(rows, rows_of(structure, True, values=values, engine="casadi"))
+        expected = of_state_and_command(structure, rows)
+        np.testing.assert_array_equal(fmu_rows(structure, True, 3, folder, values), expected)
+        every = rows_of(structure, True, every=100, values=values)
+        wanted = of_state_and_command(structure, every)
+        n = len(kinds)
+        wanted = np.hstack([wanted[:, :n], wanted[:, 4 * n :]])
+        np.testing.assert_array_equal(exported_rows(structure, folder, values)[: len(wanted)], wanted)
+        system, first = program(structure).system, rows_of(structure, True, every=1, values=values)[:2]
+        w = np.array([system.function("signals")(t, [], values) for t in (0.0, STEP / 2, STEP)]).squeeze(axis=2)
+        x, u = of_state_and_command(structure, first)[0, : 4 * n], of_state_and_command(structure, first)[0, 4 * n :]
+        k1, *_ = slopes = [np.array(system.function("loop_plant")(w[0], x, u, values)).ravel()]
+        for at, factor in ((1, 0.5), (1, 0.5), (2, 1.0)):
+            state = x + factor * STEP * slopes[-1]
+            slopes.append(np.array(system.function("loop_plant")(w[at], state, u, values)).ravel())
+        stepped = x + STEP / 6 * (k1 + 2 * slopes[1] + 2 * slopes[2] + slopes[3])
+        scale = np.abs(stepped).max() + STEP * np.abs(slopes).max()
+        np.testing.assert_allclose(of_state_and_command(structure, first)[1, : 4 * n], stepped, atol=1e-12 * scale)
+
+
+@pytest.mark.parametrize("n", [1, 7])
+def test_a_planar_arm_on_a_ship_is_the_same_everywhere(n: int, tmp_path: Path) -> None:
+    structure = structure_of("planar_arm", size=n, reference=SignalShape("sine", (0,) * n), **SHIP)
+    rows = rows_of(structure, True, width=4, groups=1)
+    assert np.isfinite(rows).all()
+    np.testing.assert_array_equal(rows, rows_of(structure, True, engine="casadi"))
+    expected = of_state_and_command(structure, rows)
+    for version in (2, 3):
+        np.testing.assert_array_equal(fmu_rows(structure, True, version, tmp_path), expected)
+    every = of_state_and_command(structure, rows_of(structure, True, every=100))
+    wanted = np.hstack([every[:, :n], every[:, 4 * n :]])
+    np.testing.assert_array_equal(exported_rows(structure, tmp_path)[: len(wanted)], wanted)
 
 
 @pytest.mark.parametrize("version", [2, 3])
