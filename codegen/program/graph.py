@@ -202,8 +202,10 @@ class LoopGraph(ValueGraph):
         n, system = program.system.n, program.system
         [seen] = self.add("measure", system.function("measure"), [x, p])
         reference, base = [w[k * n : (k + 1) * n] for k in range(3)], w[3 * n :]
-        third = len(base) // 3
+        third = system.base.b.numel()
         motion = [base[k * third : (k + 1) * third] for k in range(3)]
+        if system.forces:
+            motion.append(base[3 * third :])
         self.labels = {
             "control": self._labelled(system, "control", [*reference, seen, *z, p]),
             "plant": self._labelled(system, "plant", [*motion, x, u, p]),

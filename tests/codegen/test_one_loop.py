@@ -13,7 +13,10 @@ import casadi as ca
 import numpy as np
 import pytest
 from arms import structure_of, values_of
+from chains import chain, numbers_for
 from fmi_client import Client, client_library
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
 
 from springline.codegen.export import bind
 from springline.codegen.export.c import generate_files
@@ -21,6 +24,7 @@ from springline.codegen.export.fmu import Settings, fmu
 from springline.codegen.export.fmu import archive as fmu_module
 from springline.codegen.files import write_tree
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
+from springline.codegen.program import program
 from springline.model.drive import FRICTION
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS
@@ -79,8 +83,8 @@ def rows_of(
     structure: Structure, sampled: bool, every: int = HOLD, values: np.ndarray | None = None, **options: Any
 ) -> np.ndarray:
     loop = kernel(KernelSpec(structure, sampled, options=KernelOptions(flags=QUICK, **options)))
-    settings = LoopSettings(STEPS, STEP, hold=HOLD, output_every=every)
-    runs = loop.run(values_of(structure)[None], settings)
+    values = values_of(structure) if values is None else values
+    runs = loop.run(values[None], LoopSettings(STEPS, STEP, hold=HOLD, output_every=every))
     assert runs.status[0] == 0
     return runs.trajectory[0]
 
@@ -261,7 +265,9 @@ def test_any_chain_on_a_ship_is_the_same_everywhere(
         pushed = SignalShape("sine", (1,) * len(kinds))
         structure = structure_of(arm.name, friction=ALL_FRICTION, disturbance=pushed, **SHIP)
         numbers = numbers_for(len(kinds), np.random.default_rng(seed))
-        values = values_of(structure, {f"{table}.{k}": v for k, v in numbers.items() for table in ("plant", "mechanism")})
+        values = values_of(
+            structure, {f"{table}.{k}": v for k, v in numbers.items() for table in ("plant", "mechanism")}
+        )
         rows = rows_of(structure, True, values=values, width=4, groups=2)
         assert np.isfinite(rows).all()
         np.testing.assert_array_equal(rows, rows_of(structure, True, values=values, engine="casadi"))
