@@ -106,14 +106,14 @@ def kernels(interpreter: Path) -> dict[str, Timed]:
     with packages_of(interpreter):
         ours = importlib.import_module("springline.benchmarks.contenders.ours")
         toolchain = ours.toolchain  # from where it lies in that checkout
-        load: Callable[[Path], ctypes.CDLL] = vars(toolchain)["load"]
+        load: Callable[[Path], ctypes.CDLL] = toolchain.load
         clocks: list[Clock] = []
 
         def clocked(library: Path) -> Clock:
             clocks.append(Clock(load(library)))
             return clocks[-1]
 
-        vars(toolchain)["load"] = clocked
+        toolchain.load = clocked
         for contender in ours.CONTENDERS:
             if contender.variant in WORK:
                 run = contender.build()

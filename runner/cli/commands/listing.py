@@ -87,13 +87,14 @@ def laws() -> list[Row]:
 def parameters() -> list[Row]:
     """Every parameter of mechanism, drive and controller: scenario key, unit, default, bounds, meaning.
 
-    What differs from joint to joint has a list of defaults, and of units.
+    What differs from joint to joint has a list of defaults, and of units; what is not the same for all mechanisms has
+    a row for each, with its name.
     """
     from springline.model.drive import EPSILON, friction_parameters
     from springline.model.mechanisms import MECHANISMS
     from springline.model.system import control_parameters
 
-    rows: dict[str, Row] = {}
+    rows: list[tuple[Row, list[str]]] = []
     for mechanism in MECHANISMS.values():
         tables = {
             "mechanism": mechanism.parameters,
@@ -102,8 +103,15 @@ def parameters() -> list[Row]:
         }
         for table, declared in tables.items():
             for row in _rows(table, declared, mechanism.joints):
-                rows.setdefault(row["key"], row)
-    return list(rows.values())
+                same = next((names for known, names in rows if known == row), None)
+                if same is None:
+                    rows.append((row, [mechanism.name]))
+                else:
+                    same.append(mechanism.name)
+    return [
+        {"key": row["key"], "mechanism": "" if len(names) == len(MECHANISMS) else ", ".join(names), **row}
+        for row, names in rows
+    ]
 
 
 def scenarios() -> list[Row]:

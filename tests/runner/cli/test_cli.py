@@ -28,6 +28,7 @@ from springline.benchmarks.contenders import CONTENDERS
 from springline.codegen.files import Changes, write_tree
 from springline.codegen.kernel import kernel
 from springline.model.control import LAWS
+from springline.model.drive import friction_parameters
 from springline.runner.cli import app, terminal
 from springline.runner.cli.commands import run as run_command
 from springline.runner.cli.options import parse_set
@@ -830,19 +831,23 @@ def rows_of(what: str) -> list[dict[str, object]]:
 
 
 def test_list_parameters_tells_all_that_the_model_declares() -> None:
-    rows = {row["key"]: row for row in rows_of("parameters")}
+    listed = rows_of("parameters")
+    rows = {row["key"]: row for row in listed if row["mechanism"] in ("", "transfer_manipulator")}
+    assert {row["mechanism"] for row in listed} == {"", "transfer_manipulator", "planar_arm"}
+    assert [row["default"] for row in listed if row["key"] == "mechanism.length"] == [[0.5, 0.5]]
     assert all(row["unit"] and row["meaning"] and row["bounds"] for row in rows.values())
     assert rows["control.U_max"]["default"] == ["inf", "inf"]
     assert rows["control.K_f"]["unit"] == ["N s/m", "N m s/rad"]
     assert rows["control.delta"]["unit"] == "m or rad"
     slots = load_scenario("paper/nominal").system().slots
     numbered = {slot.key for slot in slots if slot.key.partition(".")[0] in {"mechanism", "drive", "control"}}
-    assert {re.sub(r"\.\d$", "", key) for key in numbered} == set(rows)
+    friction = {f"drive.{item.name}" for item in friction_parameters("elastic")}  # only where it is not zero
+    assert {re.sub(r"\.\d$", "", key) for key in numbered} == set(rows) - friction
 
 
 def test_list_laws_and_mechanisms() -> None:
     assert {row["name"] for row in rows_of("laws")} == set(LAWS)
-    assert [row["name"] for row in rows_of("mechanisms")] == ["transfer_manipulator"]
+    assert [row["name"] for row in rows_of("mechanisms")] == ["transfer_manipulator", "planar_arm"]
 
 
 @pytest.mark.parametrize(("what", "names"), [("scenarios", packaged_scenarios()), ("sweeps", packaged_sweeps())])
