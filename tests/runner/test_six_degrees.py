@@ -190,6 +190,18 @@ def test_a_record_of_another_convention_is_scaled(tmp_path: Path) -> None:
     assert scaled.structure().base_motion == SignalShape("table", (1, 0, 0, 0, 0, 1))
 
 
+def test_a_ramp_is_one_whichever_way_it_counts(tmp_path: Path) -> None:
+    """What its digits are worth has no sign: with `ends = "hold"` it stops as its mirror image does."""
+    t = 0.05 * np.arange(60)
+    ramp = record(tmp_path, heave=np.round(1.5 * t + 1e-3 * np.sin(t), 3))
+    tables = [
+        load_scenario("paper/nominal", {"base_motion": ramp | {"scale": {"heave": scale}}}).tables()[0]
+        for scale in (1.0, -1.0)
+    ]
+    assert np.array_equal(tables[0].bounds, tables[1].bounds)
+    assert tables[0].bounds[0] == pytest.approx(1.5 / 0.05, rel=0.01)
+
+
 def test_a_reference_is_scaled_by_its_joints(tmp_path: Path) -> None:
     table = record(tmp_path, lift=np.arange(60.0)) | {"scale": {"lift": 0.5}}
     scenario = load_scenario("paper/nominal", {"reference": table, "simulation.duration": 1.0})
