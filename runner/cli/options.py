@@ -58,7 +58,9 @@ def tunable_names(text: str) -> list[str] | Literal["all", "none"]:
     match text:
         case "all" | "none":
             return text
-    return [name.strip() for name in text.split(",")]
+    from springline.runner.scenario import canonical_key
+
+    return [canonical_key(name.strip()) for name in text.split(",")]
 
 
 def overrides(changes: Sequence[str] | None, source: str) -> dict[str, object]:

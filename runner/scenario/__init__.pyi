@@ -1,4 +1,5 @@
 from .checking import resolve as resolve
+from .dotted import canonical_key as canonical_key
 from .dotted import expect_keys as expect_keys
 from .locate import expect_kind as expect_kind
 from .locate import file_text as file_text

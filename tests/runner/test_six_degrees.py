@@ -190,6 +190,18 @@ def test_a_record_of_another_convention_is_scaled(tmp_path: Path) -> None:
     assert scaled.structure().base_motion == SignalShape("table", (1, 0, 0, 0, 0, 1))
 
 
+def test_a_ramp_is_one_whichever_way_it_counts(tmp_path: Path) -> None:
+    """What its digits are worth has no sign: with `ends = "hold"` it stops as its mirror image does."""
+    t = 0.05 * np.arange(60)
+    ramp = record(tmp_path, heave=np.round(1.5 * t + 1e-3 * np.sin(t), 3))
+    tables = [
+        load_scenario("paper/nominal", {"base_motion": ramp | {"scale": {"heave": scale}}}).tables()[0]
+        for scale in (1.0, -1.0)
+    ]
+    assert np.array_equal(tables[0].bounds, tables[1].bounds)
+    assert tables[0].bounds[0] == pytest.approx(1.5 / 0.05, rel=0.01)
+
+
 def test_a_reference_is_scaled_by_its_joints(tmp_path: Path) -> None:
     table = record(tmp_path, lift=np.arange(60.0)) | {"scale": {"lift": 0.5}}
     scenario = load_scenario("paper/nominal", {"reference": table, "simulation.duration": 1.0})
@@ -437,10 +449,37 @@ def test_wrong_keys_beside_it_are_told(circle: Path, text: str, told: list[str])
     assert all(part in str(caught.value) for part in told), str(caught.value)
 
 
-def test_commands_take_it_and_refuse_it_without_code(circle: Path, tmp_path: Path) -> None:
-    def springline(*arguments: object) -> Any:
-        return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="springline")
+def springline(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="springline")
 
+
+def test_either_name_is_tunable_in_c(load: Any, tmp_path: Path) -> None:
+    load(base(f"heave = {TERM}"))
+    headers = []
+    for name in ("shake", "heave"):
+        done = springline("export", "c", tmp_path / "s.toml", "-o", tmp_path / name, "--tunable", f"base_motion.{name}")
+        assert done.exit_code == 0, done.output
+        headers.append((tmp_path / name / "include" / "springline.h").read_text())
+    assert headers[0] == headers[1] and "base_motion_shake_0_omega;" in headers[0]
+
+
+def test_a_sweep_over_it_can_be_replayed(circle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over its parameters, and over mounts from none on."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sweep.toml").write_text("""
+        scenario = "c.toml"
+        method = "grid"
+        [vary]
+        "base_motion.mount.0" = { values = [0.0, 3.0] }
+        "base_motion.rate" = { values = [0.02, 0.2] }
+    """)
+    assert springline("batch", "sweep.toml", "-o", "data", "--no-plot", "--jobs", 1).exit_code == 0
+    for run in (0, 1, 3):
+        done = springline("replay", "data", run, "--no-plot", "-o", f"run{run}", "--code", "circle.py")
+        assert done.exit_code == 0 and "bit for bit" in done.output, done.output
+
+
+def test_commands_take_it_and_refuse_it_without_code(circle: Path, tmp_path: Path) -> None:
     done = springline("run", circle, "-o", tmp_path / "out", "--no-plot", "--set", "base_motion.radius=90.0")
     assert done.exit_code == 0, done.output
     refused = springline("run", circle, "-o", tmp_path / "no", "--no-plot", "--no-code")
