@@ -167,12 +167,12 @@ def test_numbers_too_large_to_run_with_are_refused_with_key_and_limit(
 
 
 def test_a_trajectory_beyond_the_memory_is_refused_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Three times 20 numbers a row; the first row and the last come besides those that output_every asks for."""
+    """Three times 32 numbers a row; the first row and the last come besides those that output_every asks for."""
     scenario = load_scenario("paper/nominal", {"simulation.duration": 0.1, "simulation.output_every": 3})
     rows, module = 1000 // 3 + 2, import_module("springline.runner.run.limits")
-    monkeypatch.setattr(module, "memory", lambda: 3 * 8 * 20 * rows)
+    monkeypatch.setattr(module, "memory", lambda: 3 * 8 * 32 * rows)
     assert len(simulate(scenario).trajectory) == rows
-    monkeypatch.setattr(module, "memory", lambda: 3 * 8 * 20 * rows - 1)
+    monkeypatch.setattr(module, "memory", lambda: 3 * 8 * 32 * rows - 1)
     told = (
         f"output_every: expected at least 4 for 1000 steps: {rows} rows are more than {rows - 1}, all that .* of memory"
     )
@@ -181,7 +181,7 @@ def test_a_trajectory_beyond_the_memory_is_refused_before_the_run(monkeypatch: p
     assert len(simulate(scenario.with_overrides({"simulation.output_every": 4})).trajectory) < rows
 
 
-@pytest.mark.parametrize(("form", "size"), [("parquet", 160), ("csv", 400)])
+@pytest.mark.parametrize(("form", "size"), [("parquet", 256), ("csv", 640)])
 def test_a_trajectory_beyond_the_disk_is_refused_before_the_run(
     form: str, size: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
