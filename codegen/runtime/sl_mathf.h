@@ -25,7 +25,8 @@
  * float */
 #if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16 && \
     FLT_EVAL_METHOD != 32
-#error "sl_mathf.h needs floats evaluated as float: -mfpmath=sse or -fexcess-precision=fast"
+#error "sl_mathf.h needs floats evaluated as float: on x86 -msse2 -mfpmath=sse, on s390x \
+-fexcess-precision=fast"
 #endif
 typedef char slf_float_has_the_size_of_uint32_t[sizeof(float) == sizeof(uint32_t) ? 1 : -1];
 #ifdef __clang__

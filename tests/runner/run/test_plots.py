@@ -58,8 +58,10 @@ def test_what_a_run_does_not_have_has_no_figure(monkeypatch: pytest.MonkeyPatch)
 def test_a_recorded_base_motion_is_set_against_the_error(at_sea: Run) -> None:
     figures = run_figures(*at_sea)
     assert set(figures) == ALWAYS | {"steady_state", "base_motion", "error_over_base", "error_against_base"}
-    assert [axes.get_ylabel() for axes in figures["base_motion"].axes] == ["shake [m]", "pitch [rad]", "roll [rad]"]
-    assert len(figures["error_against_base"].axes) == 6
+    assert [axes.get_ylabel() for axes in figures["base_motion"].axes] == [
+        "heave [m]", "pitch [rad]", "roll [rad]", "surge [m]", "sway [m]", "yaw [rad]",
+    ]  # fmt: skip
+    assert len(figures["error_against_base"].axes) == 2 * 6
 
 
 def test_a_run_that_stopped_says_so_and_when(diverged: Run) -> None:

@@ -463,7 +463,7 @@ def test_a_run_reports_accelerations_and_warns_on_stderr_alone(tmp_path: Path, m
     assert json.loads(result.stdout)["status"] == "ok"
     _, report, warning = result.stderr.splitlines()
     assert report.startswith("base_motion: the largest accelerations (and second differences of the rows) of ")
-    assert "m.csv are shake 1 m/s^2 (1), roll " in report and "rad/s^2 (" in report
+    assert "m.csv are heave 1 m/s^2 (1), roll " in report and "rad/s^2 (" in report
     assert warning.startswith("base_motion.columns.roll: the spline through column 'b' of ")
     refusal = springline("run", "s.toml", "-o", "no", "--set", "base_motion.max_gap=0.01")
     assert refusal.exit_code == 2 and "m.csv, line 3, column 't': a gap from 0 s" in refusal.stderr
@@ -473,7 +473,7 @@ def test_a_run_reports_accelerations_and_warns_on_stderr_alone(tmp_path: Path, m
 def test_a_units_row_is_held_against_the_units_of_the_scenario(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = PLAIN.replace("t,a", "t,a\ns,cm")
-    with pytest.raises(InputError, match=r"base_motion\.units\.shake: .*m\.csv has 'cm' .* reads m: say \"cm\" here"):
+    with pytest.raises(InputError, match=r"base_motion\.units\.heave: .*m\.csv has 'cm' .* reads m: say \"cm\" here"):
         scenario_of(tmp_path, text)
     plain = scenario_of(tmp_path, PLAIN, 'units = { shake = "cm" }')
     assert scenario_of(tmp_path, text, 'units = { shake = "cm" }') == plain
@@ -483,7 +483,7 @@ def test_a_units_row_is_held_against_the_units_of_the_scenario(tmp_path: Path, m
 
 def test_the_packaged_record_is_clean() -> None:
     *_, report = load_scenario("ship/vessel_10hz").notes
-    assert "shake 0.43" in report and "(0.43" in report
+    assert "heave 0.43" in report and "(0.43" in report
 
 
 def test_max_gap_is_kept_with_the_scenario(tmp_path: Path) -> None:
