@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from springline.model.base import BaseCoordinate
@@ -34,6 +35,7 @@ Floats = NDArray[np.float64]
 
 
 _POINTS = 2000  # of a scatter plot
+_MOST_COLUMNS = 3  # side by side on a page, so that their numbers can be read
 _MOVES = 1e-12  # a base coordinate that stays below this stands still
 
 
@@ -239,16 +241,23 @@ def _error_over_base(run: _Run) -> Figure:
 
 def _error_against_base(run: _Run) -> Figure:
     """Each joint's error against each moving coordinate of the base, once the start is over, with their correlation."""
-    figure, grid = panels(len(run.joints), len(run.moving), width=PAGE, height=1.7, share_x=False)
+    columns = min(len(run.moving), _MOST_COLUMNS)
+    blocks = -(-len(run.moving) // columns)
+    figure, grid = panels(len(run.joints) * blocks, columns, width=PAGE, height=1.7, share_x=False)
     late = np.flatnonzero(run.settled)
     late = late[:: max(1, len(late) // _POINTS)]
-    for row, joint in zip(grid, run.joints, strict=True):
+    for j, joint in enumerate(run.joints):
+        own = grid[j * blocks : (j + 1) * blocks]
         e = run[f"e_{joint.name}"][late]
-        for axes, coordinate in zip(row, run.moving, strict=True):
+        for axes in own.flat[len(run.moving) :]:
+            axes.remove()
+        for axes, coordinate in zip(own.flat, run.moving, strict=False):
             b = run[coordinate.symbol][late]
             axes.plot(b, e, ".", markersize=2, color=LINES[0]["color"], alpha=0.4, markeredgewidth=0, rasterized=True)
             axes.set_title(f"correlation {np.corrcoef(b, e)[0, 1]:+.2f}".replace("-", "−"), loc="right", fontsize=7)
             axes.set_xlabel(label(coordinate.key, coordinate.unit))
             axes.margins(x=0.03)
-        row[0].set_ylabel(label(f"{joint.name} error", run.unit(f"e_{joint.name}")))
+            axes.xaxis.set_major_locator(MaxNLocator(4))
+        for axes in own[:, 0]:
+            axes.set_ylabel(label(f"{joint.name} error", run.unit(f"e_{joint.name}")))
     return figure
