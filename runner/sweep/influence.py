@@ -108,7 +108,7 @@ def scatter_matrix(runs: Runs) -> Figure:
     for g, name in enumerate(runs.names[:MOST_GROUPS] if len(runs.names) > 1 else []):
         grid[0, 0].plot([], [], ".", color=LINES[g]["color"], label=name)
     if not runs.ok.all():
-        grid[0, 0].plot([], [], "x", color=STOPPED, label="diverged")
+        grid[0, 0].plot([], [], "x", color=STOPPED, label="stopped early")
     legend_above(figure, columns=4)
     return figure
 

@@ -59,7 +59,7 @@ def settling_map(runs: Runs) -> Figure:
         )
         if low > 0:
             plain_decades(bar.ax.yaxis)
-    for name, color in (("never settled", _NEVER), ("diverged", STOPPED)):
+    for name, color in (("never settled", _NEVER), ("stopped early", STOPPED)):
         grid[0, 0].plot([], [], "s", color=color, label=name)
     if runs.chattering.any():
         style = {**_HATCH, "facecolor": "0.3"}

@@ -47,7 +47,7 @@ class Tally:
     runs: int
     found: int = 0
     done: int = 0
-    diverged: int = 0
+    stopped_early: int = 0
     failed: int = 0
     steps: int = 0
     failures: list[str] = field(default_factory=list)
@@ -107,7 +107,7 @@ def run_sweep(
                 if problem is None:
                     done.add(chunk.number)
                     tally.done += chunk.runs
-                    tally.diverged += int(np.count_nonzero(outcome.runs.status))
+                    tally.stopped_early += int(np.count_nonzero(outcome.runs.status))
             tally.steps += chunk.runs * chunk.group.work.settings.steps
             in_a_row = 0 if problem is None else in_a_row + 1
             if problem is not None:

@@ -257,7 +257,7 @@ def _progress(plan: Plan, *, quiet: bool, clock: Callable[[], float] = time.mono
     def counts(tally: Tally, steps: int) -> str:
         return (
             f"{rate(steps):,.0f} runs/s · {tally.found + tally.done:,} done · {tally.failed:,} failed · "
-            f"{tally.diverged:,} diverged"
+            f"{tally.stopped_early:,} stopped early"
         )
 
     if quiet or not sys.stdout.isatty():

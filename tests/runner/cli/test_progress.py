@@ -40,4 +40,4 @@ def test_who_sees_no_bar_gets_a_line_every_ten_seconds(
     assert said.out == ""
     lines = said.err.splitlines()
     assert [line.split(" · ")[2] for line in lines] == ["100 done", "140 done", "180 done"]
-    assert lines[0] == (f"{sweep}: 33 % of 300 runs · 4 runs/s · 100 done · 0 failed · 0 diverged · 50 s left")
+    assert lines[0] == (f"{sweep}: 33 % of 300 runs · 4 runs/s · 100 done · 0 failed · 0 stopped early · 50 s left")

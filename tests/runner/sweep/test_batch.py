@@ -204,7 +204,7 @@ def test_a_kept_run_that_stopped_ends_where_it_stopped(tmp_path: Path) -> None:
     limits = "simulation.bound = 60.0\nsimulation.output_every = 3\ncontrol.k3 = 1000.0"
     text = SWEEP.replace("samples = 300", "samples = 20").replace("duration = 0.002", f"duration = 0.02\n{limits}")
     file.write_text(f"{text}[keep]\ntrajectories = 9\n", encoding="utf-8")
-    assert run(file, tmp_path / "data").diverged > 0
+    assert run(file, tmp_path / "data").stopped_early > 0
     dataset, table = Dataset(place(tmp_path / "data")), read_dataset(tmp_path / "data")
     plan = stored_plan(dataset)
     stopped = 0
