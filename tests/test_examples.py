@@ -9,11 +9,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
+import numpy as np
 import pytest
+from arms import structure_of, values_of
+from chains import chain, numbers_for
 
 from springline.codegen.export import bind
 from springline.codegen.export.c import generate_files
 from springline.codegen.files import write_tree
+from springline.model.mechanisms import MECHANISMS
+from springline.model.structure import SignalShape
 from springline.runner import load_scenario
 
 ROOT = Path(__file__).parents[1]
@@ -106,6 +111,42 @@ def test_casadi_external(tmp_path: Path) -> None:
     assert "springline_plant:(b[3],db[3],ddb[3],x[8],u[2])->(dx[8]) External" in printed
     frequencies = json.loads(printed.splitlines()[-1].split(": ")[1])
     assert frequencies == pytest.approx([1036.5, 1414.7], abs=0.2)  # sqrt of the eigenvalues of (M1^-1 + M2^-1) K
+
+
+@pytest.mark.parametrize("arm", ["planar", "spatial"])
+def test_firmware_of_seven_joints(
+    arm: str, tmp_path: Path, require_tool: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A Cortex-M7 computes what this machine computed, on a ship in six degrees."""
+    gcc = require_tool("arm-none-eabi-gcc", "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi")
+    qemu = require_tool("qemu-system-arm", "apt-get install qemu-system-arm")
+    others: dict[str, float] = {}
+    given = {"base_motion": SignalShape("sine", (1,) * 6), "reference": SignalShape("sine", (0,) * 7)}
+    if arm == "planar":
+        structure = structure_of("planar_arm", size=7, **given)
+    else:
+        chain_of_seven = chain("rrprrpr", "quarter")
+        monkeypatch.setitem(MECHANISMS, "firmware_chain", chain_of_seven)
+        structure = structure_of("firmware_chain", **given)
+        numbers = numbers_for(7, np.random.default_rng(4))
+        others = {f"{table}.{name}": v for name, v in numbers.items() for table in ("plant", "mechanism")}
+    export, board = tmp_path / "export", EXAMPLES / "cortex_m"
+    write_tree(export, *generate_files(bind(structure, values_of(structure, others))))
+    sources = [export / "self_check.c", export / "src/springline_model.c", export / "src/springline.c"]
+    program = tmp_path / "self_check.elf"
+    run(
+        gcc, "-mthumb", "-mcpu=cortex-m7", "-mfpu=fpv5-d16", "-mfloat-abi=hard", "-std=c99", "-O2", "-ffp-contract=off",
+        "-DSEMIHOSTING", f"-I{export}/include", f"-I{export}/src", board / "startup.c", *sources,
+        "--specs=rdimon.specs",
+        "-nostartfiles", "-T", board / "mps2.ld", "-Wl,--no-warn-rwx-segments", "-o", program,
+    )  # fmt: skip
+    done = subprocess.run(
+        [qemu, "-machine", "mps2-an500", "-nographic", "-monitor", "none", "-serial", "none", "-semihosting-config",
+         "enable=on,target=native", "-kernel", str(program)],
+        cwd=export, capture_output=True, text=True, check=False, timeout=300, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "all bits as expected" in done.stdout
 
 
 def test_firmware(tmp_path: Path, require_tool: Callable[..., str]) -> None:

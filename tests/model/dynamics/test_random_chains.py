@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from springline.model.drive import COULOMB_VELOCITY, FRICTION
 from springline.model.mechanisms import MECHANISMS
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
@@ -19,12 +20,12 @@ SEEDS = st.integers(0, 2**32 - 1)
 def system_of(make_chain, make_numbers):
     """A system whose arm is a chain of these joints, with numbers for its parameters."""
 
-    def made(kinds, frames, seed, drive="elastic"):
+    def made(kinds, frames, seed, **structure):
         rng = np.random.default_rng(seed)
         with pytest.MonkeyPatch.context() as patched:
             patched.setitem(MECHANISMS, "chain", make_chain(kinds, frames))
             shape, moving = SignalShape("sine", (0,) * len(kinds)), SignalShape("sine", (1,) * 6)
-            system = System(Structure(mechanism="chain", reference=shape, base_motion=moving, drive=drive))
+            system = System(Structure(mechanism="chain", reference=shape, base_motion=moving, **structure))
             assert system.functions
         numbers = make_numbers(len(kinds), rng)
         p = np.array([numbers.get(slot.key.split(".", 1)[1], slot.default) for slot in system.slots])
@@ -58,6 +59,33 @@ def test_power_balance(system_of, kinds, frames, seed):
     slope = ca.Function("slope", [state], [ca.gradient(system.function("energy")(state, p), state)])(x)
     power = np.array(slope).ravel()
     assert power @ dx == pytest.approx(u @ x[3 * n :], rel=1e-9, abs=1e-10 * np.abs(power * dx).max())
+
+
+@settings(max_examples=8)
+@given(kinds=KINDS, frames=FRAMES, seed=SEEDS)
+def test_power_balance_with_damping_and_friction(system_of, kinds, frames, seed):
+    """What is missing from the motors' power is what dampers and frictions take, and they never give."""
+    system, p, rng = system_of(kinds, frames, seed, friction=tuple(item.name for item in FRICTION))
+    n = len(kinds)
+    taken = {item.name: rng.uniform(0.1, 3.0, n) for item in FRICTION}
+    for k, slot in enumerate(system.slots):
+        table, name, *index = slot.key.split(".")
+        if table == "plant" and name in taken:
+            p[k] = taken[name][int(index[0])]
+    x, u, rest = rng.normal(size=4 * n), rng.normal(size=n), np.zeros(system.base.b.numel())
+    x[2 * n : 3 * n] = x[:n] + 1e-4 * rng.normal(size=n)
+    dx = np.array(system.function("plant")(rest, rest, rest, x, u, p)).ravel()
+    state = ca.SX.sym("x", 4 * n)
+    power = np.array(
+        ca.Function("slope", [state], [ca.gradient(system.function("energy")(state, p), state)])(x)
+    ).ravel()
+    dq1, dq2 = x[n : 2 * n], x[3 * n :]
+    lost = taken["spring_damping"] * (dq2 - dq1) ** 2
+    for side, rate in (("link", dq1), ("motor", dq2)):
+        lost = lost + taken[f"{side}_viscous"] * rate**2
+        lost = lost + taken[f"{side}_coulomb"] * rate**2 / np.hypot(rate, COULOMB_VELOCITY.default)
+    assert power @ dx == pytest.approx(u @ dq2 - lost.sum(), rel=1e-9, abs=1e-10 * np.abs(power * dx).max())
+    assert lost.min() > 0
 
 
 @settings(max_examples=8)

@@ -326,7 +326,7 @@ def test_a_law_that_varies_is_found_again(folder: Path) -> None:
 # What is wrong with them
 
 
-HEAD = "import casadi as ca\nfrom springline.model import Control, Controller, Joint, Law, Mechanism, Parameter\n"
+HEAD = "import casadi as ca\nfrom springline.model import Body, Link\nfrom springline.model import Control, Controller, Joint, Law, Mechanism, Parameter\n"
 OF_ARM = (
     "class Bad(Mechanism):\n  joints = (Joint('a', 'm', 'N'),)\n  parameters = (Parameter('m', 'kg', 1.0, 'mass'), "
     "Parameter('g', 'm/s^2', 9.8, 'gravity'))\n  motor_inertia = (Parameter('I', 'kg', 1.0, 'motor'),)\n"
@@ -338,6 +338,9 @@ A, OF_LAW = (
     "class Bad(Law):\n  parameters = (Parameter('a', '1', 1.0, 'x'),)\n",
     "  def rate(self, sigma, p): return sigma\n",
 )
+OF_BODIES = OF_ARM[: OF_ARM.index("  def potential_energy")]
+LINK = f"{OF_BODIES}  def links(self, p): return [Link('a', 'prismatic', mass=p.m, "
+BODY = f"{OF_BODIES}  def bodies(self, q, p): return [Body(p.m, (q[0], 0, 0), ca.SX.eye(3), "
 TWO = (
     OF_ARM.replace("(Joint('a', 'm', 'N'),)", "(Joint('a', 'm', 'N'), Joint('s_a', 'm', 'N'))")
     .replace("'motor')", "'motor', per_joint=True)")
@@ -370,6 +373,19 @@ TWO = (
         ("control.law", f"class Bad(Law):\n  name = 'power'\n{OF_LAW}", "its name is 'power'"),
         ("mechanism.name", "class Bad(Mechanism):\n  def kinetic_energy(self, *a): return 0\n"
          "  def potential_energy(self, *a): return 0\n", "joints: expected a tuple of at least one Joint"),
+        ("mechanism.name", OF_BODIES, "does not say what the arm consists of: expected links(p), bodies(q, p), or"),
+        ("mechanism.name", f"{LINK}parent=0)]\n", "mechanism bad: links: a -> a is a circle, expected a tree"),
+        ("mechanism.name", f"{LINK}origin=(0.3, 0, 0))]\n", "link 'a': origin: expected 0, 1, -1 or an expression of"),
+        ("mechanism.name", f"{LINK}com=(ca.SX.sym('z'), 0, 0))]\n", "com: depends on 'z', which it was not given"),
+        ("mechanism.name", f"{LINK}inertia=-p.m)]\n", "link 'a': inertia: expected a number >= 0, got -1"),
+        ("mechanism.name", f"{LINK}inertia=p.m*ca.diag(ca.SX([1, 1, 3])))]\n", "no body has a principal moment above"),
+        ("mechanism.name", f"{BODY}-p.m*ca.SX.eye(3))]\n", "bodies[0]: inertia: expected principal moments >= 0"),
+        ("mechanism.name", f"{BODY}p.m*ca.diag(ca.SX([1, 1, 3])))]\n", "above the sum of the other two"),
+        ("mechanism.name", f"{BODY}p.m*ca.SX([[1, 1, 0], [0, 1, 0], [0, 0, 1]]))]\n", "expected a symmetric matrix"),
+        ("mechanism.name", f"{OF_BODIES}  def bodies(self, q, p): return [Body(-p.m, (q[0], 0, 0))]\n",
+         "bodies[0]: mass: expected a number >= 0, got -1"),
+        ("mechanism.name", f"{OF_BODIES}  def bodies(self, q, p): return [Body(p.m, (1.0, 0, 0))]\n",
+         "the mass matrix at the start is not positive definite"),
         ("mechanism.name", f"{OF_ARM}return 0\n", "the mass matrix at the start is not positive definite"),
         ("mechanism.name", f"{OF_ARM}return -p.m * dq**2\n", "the mass matrix at the start is not positive definite"),
         ("mechanism.name", f"{OF_ARM}return p.m * ca.SX.sym('z') * dq**2\n", "kinetic_energy: depends on 'z'"),
