@@ -5,6 +5,7 @@ from .link import Link as Link
 from .link import Segment as Segment
 from .link import aligned as aligned
 from .link import outwards as outwards
+from .mechanism import TAKEN as TAKEN
 from .mechanism import Mechanism as Mechanism
 from .plausible import expect_plausible as expect_plausible
 from .registry import MECHANISMS as MECHANISMS

@@ -19,9 +19,18 @@ def trajectory_schema(system: System) -> pa.Schema:
     return pa.schema([field(entry.name, entry.unit) for entry in system.trajectory])
 
 
-def metrics_schema(system: System) -> pa.Schema:
-    """Columns of a table of metrics, metric by metric, then status and t_end."""
-    judged = [field(entry.name, entry.unit) for entry in system.metrics]
+def metrics_schema(*systems: System) -> pa.Schema:
+    """Columns of a table of metrics, metric by metric, then status and t_end.
+
+    Of several systems it has the columns of each. Raises ValueError where one name has two units.
+    """
+    units: dict[str, str] = {}
+    for k in range(len(METRICS)):
+        for system in systems:
+            for entry in system.metrics[k * system.n : (k + 1) * system.n]:
+                if units.setdefault(entry.name, entry.unit) != entry.unit:
+                    raise ValueError(f"{entry.name} would be in {units[entry.name]} and in {entry.unit}")
+    judged = [field(name, unit) for name, unit in units.items()]
     return pa.schema([*judged, field("status", "", pa.string()), field("t_end", "s")])
 
 

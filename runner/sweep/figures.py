@@ -26,7 +26,7 @@ def summary_figures(plan: Plan, summary: Summary) -> dict[str, Figure]:
     runs = Runs(
         summary.shown,
         summary.units,
-        plan.groups[0].work.system.joints,
+        plan.joints,
         [axis.key for axis in axes],
         {axis.key: axis.kind == "log_uniform" for axis in axes},
         np.searchsorted([group.first for group in plan.groups], summary.shown["run"].to_numpy(), side="right") - 1,

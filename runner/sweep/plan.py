@@ -19,6 +19,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from springline.model.parameters import Joint
 from springline.runner.files import InputError, Problem, unknown, value_text
 from springline.runner.run import field, metrics_schema, metrics_table, trajectory_schema
 from springline.runner.scenario import (
@@ -120,6 +121,7 @@ class Plan:
         counts = [-(-group.runs // self.chunk_size) for group in self.groups]
         self._first_chunks = [0, *itertools.accumulate(counts)]
         self._refuse_endless()
+        assert self._metrics  # or it refuses arms that do not go into one table
 
     # Chunks
 
@@ -169,6 +171,15 @@ class Plan:
         every = self.sweep.keep
         return [] if every == 0 else list(range(-chunk.first % every, chunk.runs, every))
 
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints that the runs have, each name once."""
+        found: dict[str, Joint] = {}
+        for group in self.groups:
+            for joint in group.work.system.joints:
+                found.setdefault(joint.name, joint)
+        return tuple(found.values())
+
     # Numbers
 
     def columns(self, chunk: Chunk) -> Columns:
@@ -211,14 +222,26 @@ class Plan:
         """One row a run of a chunk with the given columns: run, every key of the sweep, every metric, status, t_end."""
         runs = np.arange(chunk.first, chunk.first + chunk.runs)
         keys = [pa.array(columns[item.name], item.type) for item in self.key_fields]
-        metrics = metrics_table(chunk.group.work.system, outcome.runs)
-        return pa.Table.from_arrays([pa.array(runs), *keys, *metrics.columns], schema=self.schema)
+        found = metrics_table(chunk.group.work.system, outcome.runs)
+        metrics = [
+            found[item.name] if item.name in found.column_names else pa.nulls(len(runs), item.type)
+            for item in self._metrics
+        ]
+        return pa.Table.from_arrays([pa.array(runs), *keys, *metrics], schema=self.schema)
 
     @cached_property
     def schema(self) -> pa.Schema:
         """Columns of the dataset's table."""
-        metrics = metrics_schema(self.groups[0].work.system)
-        return pa.schema([field("run", "", pa.int64()), *self.key_fields, *metrics])
+        return pa.schema([field("run", "", pa.int64()), *self.key_fields, *self._metrics])
+
+    @cached_property
+    def _metrics(self) -> pa.Schema:
+        """The columns of metrics: of every joint that a group has; it is null where another has none of that name."""
+        try:
+            return metrics_schema(*{id(group.work.system): group.work.system for group in self.groups}.values())
+        except ValueError as error:
+            text = f"{error}: joints of one name in one sweep are expected to have one unit"
+            raise InputError(Problem(self.sweep.source, "vary", text)) from error
 
     @cached_property
     def key_fields(self) -> list[pa.Field]:

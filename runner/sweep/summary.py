@@ -78,7 +78,7 @@ def summarize(plan: Plan, dataset: Dataset, done: Collection[int] | None = None)
     runs = sum(chunk.runs for chunk in chunks)
     parts = [dataset.part_name(chunk.number) for chunk in chunks]
     names = group_names(plan)
-    joints = plan.groups[0].work.system.joints
+    joints = plan.joints
     outcomes = {name: dict.fromkeys((*_OUTCOMES, _CHATTERING), 0) for name in names}
     # Gathered as arrays of their final length: small tables would be many, and each a hole in the memory.
     rows = sum(np.count_nonzero(_picked(chunk, runs)) for chunk in chunks)

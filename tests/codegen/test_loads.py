@@ -14,16 +14,13 @@ import numpy as np
 import pytest
 from fmi_client import Client, Values, client_library, refused
 
-from springline.codegen.export.bound import bind
-from springline.codegen.export.c.tree import generate_files
+from springline.codegen.export import bind
+from springline.codegen.export.c import generate_files
+from springline.codegen.export.fmu import Settings, fmu
 from springline.codegen.export.fmu import archive as fmu_module
-from springline.codegen.export.fmu.archive import fmu
-from springline.codegen.export.fmu.settings import Settings
-from springline.codegen.files.manifest import write_tree
-from springline.codegen.kernel.compiled import kernel
-from springline.codegen.kernel.settings import LoopSettings
-from springline.codegen.kernel.spec import KernelOptions, KernelSpec
-from springline.codegen.program.frozen import Program, program
+from springline.codegen.files import write_tree
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, kernel
+from springline.codegen.program import Program, program
 from springline.model.drive import FRICTION
 from springline.model.quantities import TIP, TIP_RATE
 from springline.model.structure import SignalShape, Structure

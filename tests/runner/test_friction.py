@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 from springline.runner import batch, load_scenario, simulate
 from springline.runner.cli import app
 from springline.runner.files import InputError
-from springline.runner.sweep.plan import Plan
-from springline.runner.sweep.sweep import load_sweep
+from springline.runner.sweep import Plan, load_sweep
 
 SHORT = {"simulation.duration": 0.05}
 

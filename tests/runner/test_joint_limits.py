@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from springline.codegen.kernel import LoopSettings
 from springline.model.drive import friction_parameters
-from springline.model.mechanisms.mechanism import TAKEN
+from springline.model.mechanisms import TAKEN
 from springline.runner import batch, load_scenario, simulate
 from springline.runner.cli import app
 from springline.runner.files import InputError

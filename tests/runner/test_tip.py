@@ -15,7 +15,7 @@ from springline.model.quantities import TIP, TIP_RATE
 from springline.model.structure import SignalShape, Structure
 from springline.runner import load_scenario, simulate
 from springline.runner.files import units
-from springline.runner.run.figures import run_figures
+from springline.runner.run import run_figures
 
 SEA = {
     "simulation.duration": 0.5,

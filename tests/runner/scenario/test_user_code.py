@@ -326,7 +326,10 @@ def test_a_law_that_varies_is_found_again(folder: Path) -> None:
 # What is wrong with them
 
 
-HEAD = "import casadi as ca\nfrom springline.model import Body, Link\nfrom springline.model import Control, Controller, Joint, Law, Mechanism, Parameter\n"
+HEAD = (
+    "import casadi as ca\n"
+    "from springline.model import Body, Control, Controller, Joint, Law, Link, Mechanism, Parameter\n"
+)
 OF_ARM = (
     "class Bad(Mechanism):\n  joints = (Joint('a', 'm', 'N'),)\n  parameters = (Parameter('m', 'kg', 1.0, 'mass'), "
     "Parameter('g', 'm/s^2', 9.8, 'gravity'))\n  motor_inertia = (Parameter('I', 'kg', 1.0, 'motor'),)\n"

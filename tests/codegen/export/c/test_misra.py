@@ -11,7 +11,7 @@ import pytest
 
 from springline.codegen.export import bind
 from springline.codegen.export.c.tree import generate_files
-from springline.codegen.files.manifest import write_tree
+from springline.codegen.files import write_tree
 from springline.runner.scenario import load_scenario
 
 PAGE = Path(__file__).parents[4] / "docs" / "embedding.md"

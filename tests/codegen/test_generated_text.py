@@ -9,7 +9,7 @@ from typing import Any
 import jinja2
 import pytest
 
-from springline.codegen.export.bound import bind
+from springline.codegen.export import bind
 from springline.codegen.export.c.interface import TypedInterface
 from springline.codegen.export.c.texts import text_files
 from springline.codegen.export.fmu.settings import FmiVersion, Settings
@@ -18,7 +18,7 @@ from springline.codegen.export.fmu.variables import PARTS, Part, interface, part
 from springline.codegen.export.names import check_prefix
 from springline.codegen.files.templates import LINE, aligned, comment, fitted, quoted, render, wrap
 from springline.runner import load_scenario
-from springline.runner.scenario.splines import kernel_tables
+from springline.runner.scenario import kernel_tables
 
 LONGEST = "manipulator_on_a_ship_number_7"
 INTEGRAL = """
