@@ -88,16 +88,10 @@ def test_power_balance_with_damping_and_friction(system_of, kinds, frames, seed)
     assert lost.min() > 0
 
 
-@settings(max_examples=8)
-@given(kinds=KINDS, frames=FRAMES, seed=SEEDS)
-def test_what_a_moving_base_does(system_of, kinds, frames, seed):
-    """S against another derivation: energies in the inertial frame, by Lagrange, the base's motion given over time."""
-    system, p, rng = system_of(kinds, frames, seed)
-    n, m = len(kinds), system.base.b.numel()
-    q, dq, t = ca.SX.sym("q", n), ca.SX.sym("dq", n), ca.SX.sym("t")
-    b0, db0, ddb0 = rng.normal(size=(3, m))
-    b = b0 + db0 * t + ddb0 * t**2 / 2
-    base = system.base
+def seen_from_the_earth(system, motion, q, dq, t):
+    """Kinetic and potential energy of the arm's bodies in the inertial frame, J, the base moving as b0 + db0 t + …"""
+    b0, db0, ddb0 = motion
+    b, base = b0 + db0 * t + ddb0 * t**2 / 2, system.base
     turned = ca.substitute(base.rotation, base.b, b)
     along = {item.key: b[i] for i, item in enumerate(base.coordinates)}
     moved = ca.vertcat(along["surge"], along["heave"], along["sway"])
@@ -110,14 +104,49 @@ def test_what_a_moving_base_does(system_of, kinds, frames, seed):
         w = ca.vertcat(spin[2, 1], spin[0, 2], spin[1, 0])
         kinetic += (body.mass * ca.dot(v, v) + ca.dot(w, body.inertia @ w)) / 2
         potential += body.mass * arm.g * place[1]
+    return kinetic, potential
+
+
+@settings(max_examples=8)
+@given(kinds=KINDS, frames=FRAMES, seed=SEEDS)
+def test_what_a_moving_base_does(system_of, kinds, frames, seed):
+    """S against another derivation: energies in the inertial frame, by Lagrange, the base's motion given over time."""
+    system, p, rng = system_of(kinds, frames, seed)
+    n = len(kinds)
+    motion = rng.normal(size=(3, system.base.b.numel()))
+    q, dq, t = ca.SX.sym("q", n), ca.SX.sym("dq", n), ca.SX.sym("t")
+    kinetic, potential = seen_from_the_earth(system, motion, q, dq, t)
     momentum = ca.gradient(kinetic, dq)
     needed = ca.jtimes(momentum, ca.vertcat(q, t), ca.vertcat(dq, 1)) - ca.gradient(kinetic - potential, q)
     at = [rng.normal(size=n), rng.normal(size=n)]
     wanted = np.array(ca.Function("needed", [q, dq, t, system.p], [needed])(*at, 0.0, p)).ravel()
     seen = [np.array(f).ravel() for f in (
         system.function("coriolis")(*at, p), system.function("gravity")(at[0], p),
-        system.function("base_disturbance")(b0, db0, ddb0, *at, p))]  # fmt: skip
+        system.function("base_disturbance")(*motion, *at, p))]  # fmt: skip
     np.testing.assert_allclose(seen[0] + seen[1] - seen[2], wanted, rtol=1e-9, atol=1e-10 * np.abs(wanted).max())
+
+
+@settings(max_examples=8)
+@given(kinds=KINDS, frames=FRAMES, seed=SEEDS)
+def test_power_balance_on_a_moving_base(system_of, kinds, frames, seed):
+    """Jacobi's integral of arm, motors and springs changes by the motors' power, and by -dL/dt of the base's motion."""
+    system, p, rng = system_of(kinds, frames, seed)
+    n = len(kinds)
+    motion = rng.normal(size=(3, system.base.b.numel()))
+    x, u = rng.normal(size=4 * n), rng.normal(size=n)
+    x[2 * n : 3 * n] = x[:n] + 1e-4 * rng.normal(size=n)
+    dx = np.array(system.function("plant")(*motion, x, u, p)).ravel()
+    state, t = ca.SX.sym("x", 4 * n), ca.SX.sym("t")
+    q1, dq1, *motors = ca.vertsplit(state, n)
+    kinetic, potential = seen_from_the_earth(system, motion, q1, dq1, t)
+    drive = system.drive.energy(state, system.mechanism, system._plant)
+    assert len(motors) == 2
+    jacobi = ca.dot(ca.gradient(kinetic, dq1), dq1) - (kinetic - potential) + drive
+    outputs = [ca.gradient(jacobi, state), ca.gradient(jacobi, t), ca.gradient(kinetic - potential, t)]
+    slope, by_time, led = (np.array(f).ravel() for f in ca.Function("f", [state, t, system.p], outputs)(x, 0.0, p))
+    change = slope @ dx + by_time[0]
+    scale = np.abs(slope * dx).max() + np.abs(by_time).max()
+    assert change == pytest.approx(u @ x[3 * n :] - led[0], rel=1e-9, abs=1e-10 * scale)
 
 
 @settings(max_examples=5)
