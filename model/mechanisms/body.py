@@ -65,7 +65,7 @@ def stacked(value: object) -> object:
         try:
             return ca.densify(ca.SX(ca.blockcat([list(row) for row in rows])))
         except (RuntimeError, NotImplementedError, TypeError):
-            return value
+            return value  # what is no matrix of numbers and expressions: whoever asked for one refuses it by name
     return ca.densify(value) if isinstance(value, ca.SX | ca.DM) else value
 
 

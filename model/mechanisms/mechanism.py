@@ -83,7 +83,10 @@ class Mechanism:
         return self
 
     def links(self, p: Values) -> Sequence[Link]:
-        """The kinematic tree: one link per joint, in the order of `joints`."""
+        """The kinematic tree: one link per joint, in the order of `joints`.
+
+        `check_mechanism` has refused a class that says neither this nor one of the other two.
+        """
         raise NotImplementedError
 
     def bodies(self, q: ca.SX, p: Values) -> Sequence[Body]:
