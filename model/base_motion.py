@@ -10,7 +10,7 @@ from typing import ClassVar
 import casadi as ca
 
 from springline.model.base import ALIASES, COORDINATES, MOTION_ORDER
-from springline.model.declared import column, expect_names, expect_parameters, expect_text, snake_case
+from springline.model.declared import column, expect_names, expect_parameters, expect_text, snake_case, symbols_of
 from springline.model.parameters import Parameter, ParameterVector, Values
 from springline.model.registry import Registry
 from springline.model.signals import CONSTANT_ZERO, Signal
@@ -58,9 +58,9 @@ def signals_of(motion: BaseMotion, t: ca.SX, p: Values) -> dict[str, Signal]:
         raise ValueError(f"{owner}: motion: expected six expressions ({names}), got {type(given).__name__}")
     if len(given) != len(MOTION_ORDER):
         raise ValueError(f"{owner}: motion: expected six expressions ({names}), got {len(given)}")
-    result = {}
+    result, known = {}, symbols_of(t, *p.values())
     for key, item in zip(MOTION_ORDER, given, strict=True):
-        value = column(owner, f"motion, {key}", item, 1, [t, *p.values()])
+        value = column(owner, f"motion, {key}", item, 1, known)
         rate = ca.gradient(value, t)
         result[key] = CONSTANT_ZERO if value.is_zero() else Signal(value, rate, ca.gradient(rate, t))
     return result

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence, Set
 
 import casadi as ca
 
@@ -50,19 +50,23 @@ def expect_parameters(owner: str, what: str, parameters: object, joints: Sequenc
                 raise ValueError(f"{owner}: {what}, {item.name}: expected as default {item.bounds}, got {value!r}")
 
 
-def column(owner: str, what: str, value: object, rows: int, symbols: Iterable[ca.SX]) -> ca.SX:
-    """An expression of `rows` entries that depends on `symbols` alone."""
+def column(owner: str, what: str, value: object, rows: int, known: Set[int]) -> ca.SX:
+    """An expression of `rows` entries that depends on symbols of `known` alone, which `symbols_of` gives."""
     if not isinstance(value, ca.SX | ca.DM | int | float):
         raise ValueError(f"{owner}: {what}: expected a CasADi SX expression, got {type(value).__name__}")
     made: ca.SX = ca.SX(value)
     if made.shape != (rows, 1):
         shape = "a scalar" if rows == 1 else f"{rows} x 1"
         raise ValueError(f"{owner}: {what}: expected {shape}, got {made.shape[0]} x {made.shape[1]}")
-    known = {hash_of(item) for symbol in symbols for item in ca.symvar(symbol)}
     foreign = [item.name() for item in ca.symvar(made) if hash_of(item) not in known]
     if foreign:
         raise ValueError(f"{owner}: {what}: depends on {foreign[0]!r}, which it was not given")
     return made
+
+
+def symbols_of(*expressions: ca.SX) -> Set[int]:
+    """The symbols of some columns, each as what tells it apart from another of the same name."""
+    return {hash_of(item) for item in ca.symvar(ca.vertcat(*expressions))}
 
 
 def hash_of(symbol: ca.SX) -> int:

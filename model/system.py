@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
@@ -33,7 +33,7 @@ from springline.model.control import (
     commanded,
     fast_control,
 )
-from springline.model.declared import column
+from springline.model.declared import column, symbols_of
 from springline.model.drive import (
     DRIVES,
     EPSILON,
@@ -284,7 +284,7 @@ class System:
         tip = self.mechanism.tip(self.q1, self._plant)
         if tip is None:
             return None
-        point = column(f"mechanism {self.mechanism.name}", "tip", tip, 3, [self.q1, *self._plant.values()])
+        point = column(f"mechanism {self.mechanism.name}", "tip", tip, 3, symbols_of(self.q1, *self._plant.values()))
         return tip_motion(point, self.q1, self.dq1, self.base)
 
     @property
@@ -493,3 +493,9 @@ class System:
         if name not in self.functions:
             raise KeyError(f"no function {name!r}; there are: {', '.join(self.functions)}")
         return self.functions[name]
+
+
+@lru_cache(maxsize=64)
+def system_of(structure: Structure) -> System:
+    """The System of a structure; the same object for equal structures, so that its equations are derived once."""
+    return System(structure)

@@ -21,7 +21,7 @@ from springline.codegen.program import Real, SignalTable, count_operations
 from springline.model.parameters import Slot
 from springline.model.quantities import DDQ1, DERIVATIVES, DISTURBANCE, REFERENCE, SIGMA, E, Quantity, T, entries
 from springline.model.structure import Structure
-from springline.model.system import System
+from springline.model.system import System, system_of
 
 PERIOD = 1e-3
 """s between two commands, unless an Export says otherwise."""
@@ -127,7 +127,6 @@ class Export:
     def sha256(self) -> str:
         """Hash of model, parameters and options: it changes if and only if the exported files may."""
         identity: dict[str, object] = {
-            "model": [_instructions(function) for function in self.system.functions.values()],
             "structure": asdict(self.system.structure),
             "parameters": {slot.key: value for slot, value in zip(self.slots, self.values, strict=True)},
             "tunable": [slot.key for slot in self.tunable_slots],
@@ -140,7 +139,10 @@ class Export:
         }
         if self.system.controller.states:  # nothing else depends on it
             identity["period"] = self.period
-        return hashlib.sha256(canonical_json(identity)).hexdigest()
+        digest = hashlib.sha256(canonical_json(identity))
+        for function in self.system.functions.values():
+            digest.update(_instructions(function))
+        return digest.hexdigest()
 
 
 def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
@@ -201,7 +203,7 @@ def bind(
     Raises ValueError for a wrong number of values or tables, a value out of its bounds, an unknown name or an unusable
     prefix.
     """
-    system = System(structure)
+    system = system_of(structure)
     if np.shape(values) != (len(system.slots),):
         raise ValueError(f"values have shape {np.shape(values)}, expected ({len(system.slots)},)")
     numbers = tuple(float(value) for value in values)
@@ -239,14 +241,14 @@ def _tunable(slots: Sequence[Slot], names: Sequence[str] | str) -> tuple[int, ..
     return tuple(sorted(chosen))
 
 
-def _instructions(function: ca.Function) -> list[object]:
-    """A Function as plain data: name, signature, and every instruction with its constants."""
-    rows: list[object] = [str(function)]
+def _instructions(function: ca.Function) -> bytes:
+    """A Function as text: a line with its signature, then one per instruction, constants in hexadecimal."""
+    lines = [str(function)]
     for k in range(function.n_instructions()):
         op = function.instruction_id(k)
-        row = [op, *function.instruction_output(k), *function.instruction_input(k)]
-        rows.append([*row, function.instruction_constant(k)] if op == ca.OP_CONST else row)
-    return rows
+        row = f"{op} {function.instruction_output(k)} {function.instruction_input(k)}"
+        lines.append(f"{row} {function.instruction_constant(k).hex()}" if op == ca.OP_CONST else row)
+    return "\n".join([*lines, ""]).encode()
 
 
 def provenance(export: Export) -> list[str]:

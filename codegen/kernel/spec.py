@@ -11,7 +11,7 @@ from springline.codegen.kernel.toolchain import Compiler
 from springline.codegen.nearest import nearest
 from springline.codegen.numbers import real, whole
 from springline.model.structure import Structure
-from springline.model.system import System
+from springline.model.system import system_of
 
 Engine = Literal["lanes", "casadi"]
 
@@ -105,4 +105,4 @@ class KernelSpec:
 
 @lru_cache(maxsize=512)
 def _slot_keys(structure: Structure) -> tuple[str, ...]:
-    return tuple(slot.key for slot in System(structure).slots)
+    return tuple(slot.key for slot in system_of(structure).slots)

@@ -31,7 +31,7 @@ import casadi as ca
 from springline.codegen.program.staging import split
 from springline.model.structure import Structure
 from springline.model.symbolic import as_written
-from springline.model.system import System
+from springline.model.system import System, system_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def count_operations(function: ca.Function) -> int:
 @lru_cache(maxsize=64)
 def program(structure: Structure) -> Program:
     """Build, stage and freeze the Program of a structure."""
-    system = System(structure)
+    system = system_of(structure)
     t, d, w, x, u, p = system.t, system.d, system.w, system.x, system.u, system.p
     z = [system.z] if system.controller.states else []
     later = ("rates", "update") if z else ()

@@ -12,7 +12,7 @@ from typing import ClassVar, Literal
 import casadi as ca
 
 from springline.model.control.sliding import TINY
-from springline.model.declared import column, expect_names, expect_parameters, expect_text, snake_case
+from springline.model.declared import column, expect_names, expect_parameters, expect_text, snake_case, symbols_of
 from springline.model.parameters import EVEN, LIMIT, POSITIVE, UNIT_OPEN, Bounds, Parameter, Values
 from springline.model.registry import Registry
 from springline.model.symbolic import over
@@ -141,9 +141,9 @@ def reaching_rate(law: Law, sigma: ca.SX, p: Values) -> tuple[ca.SX, ca.SX]:
 
     Raises ValueError for a law whose rate is no scalar of what it was given.
     """
-    rates, given = [], list(p.values())
+    rates, given = [], symbols_of(*p.values())
     for i, s in enumerate(ca.vertsplit(sigma)):
         with of_joint(i):
-            rates.append(column(f"law {law.name}", "rate", law.rate(s, p), 1, [s, *given]))
+            rates.append(column(f"law {law.name}", "rate", law.rate(s, p), 1, given | symbols_of(s)))
     wished = named("a_law", ca.vertcat(*rates))
     return named("a", ca.fmin(ca.fmax(wished, -p.a_max), p.a_max)), wished

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from springline.model.declared import column
+from springline.model.declared import column, symbols_of
 from springline.model.mechanisms import Mechanism
 from springline.model.parameters import Values
 
@@ -54,11 +54,11 @@ def energies_of(mechanism: Mechanism, q: ca.SX, dq: ca.SX, omega: ca.SX, force: 
 
     Raises ValueError for one that is no scalar of what it was given, or no quadratic form in the rates.
     """
-    owner, known = f"mechanism {mechanism.name}", [q, *p.values()]
+    owner, known = f"mechanism {mechanism.name}", symbols_of(q, *p.values())
     given = mechanism.kinetic_energy(q, dq, omega, p)
     energies = Energies(
-        column(owner, "kinetic_energy", given, 1, [dq, omega, *known]),
-        column(owner, "potential_energy", mechanism.potential_energy(q, force, p), 1, [force, *known]),
+        column(owner, "kinetic_energy", given, 1, known | symbols_of(dq, omega)),
+        column(owner, "potential_energy", mechanism.potential_energy(q, force, p), 1, known | symbols_of(force)),
         q, dq, omega, force,
     )  # fmt: skip
     mass = energies.mass_matrix()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,20 +38,20 @@ class Solid:
     planar: bool
 
 
-def solid(body: object, owner: str, symbols: Sequence[ca.SX]) -> Solid:
+def solid(body: object, owner: str, known: Set[int]) -> Solid:
     """What a user wrote as expressions.
 
     owner    for messages
-    symbols  what it may depend on
+    known    symbols that it may depend on
     Raises ValueError, with what was expected, for a wrong shape and a symbol that was not given.
     """
     if not isinstance(body, Body):
         raise ValueError(f"{owner}: expected a Body, got {type(body).__name__}")
-    rotation = ca.SX.eye(3) if body.rotation is None else matrix(owner, "rotation", body.rotation, symbols)
-    inertia, planar = inertia_matrix(owner, body.inertia, symbols)
+    rotation = ca.SX.eye(3) if body.rotation is None else matrix(owner, "rotation", body.rotation, known)
+    inertia, planar = inertia_matrix(owner, body.inertia, known)
     return Solid(
-        column(owner, "mass", body.mass, 1, symbols),
-        column(owner, "position", stacked(body.position), 3, symbols),
+        column(owner, "mass", body.mass, 1, known),
+        column(owner, "position", stacked(body.position), 3, known),
         ca.densify(rotation),
         inertia,
         planar,
@@ -69,21 +69,21 @@ def stacked(value: object) -> object:
     return ca.densify(value) if isinstance(value, ca.SX | ca.DM) else value
 
 
-def matrix(owner: str, what: str, value: object, symbols: Sequence[ca.SX]) -> ca.SX:
+def matrix(owner: str, what: str, value: object, known: Set[int]) -> ca.SX:
     """A 3 x 3 matrix, dense. Raises ValueError."""
     given = stacked(value)
     shape = given.shape if isinstance(given, ca.SX | ca.DM) else None
     if not isinstance(given, ca.SX | ca.DM) or shape != (3, 3):
         raise ValueError(f"{owner}: {what}: expected 3 x 3, got {f'{shape[0]} x {shape[1]}' if shape else repr(value)}")
-    return ca.reshape(column(owner, what, ca.vec(ca.SX(given)), 9, symbols), 3, 3)
+    return ca.reshape(column(owner, what, ca.vec(ca.SX(given)), 9, known), 3, 3)
 
 
-def inertia_matrix(owner: str, value: object, symbols: Sequence[ca.SX]) -> tuple[ca.SX, bool]:
+def inertia_matrix(owner: str, value: object, known: Set[int]) -> tuple[ca.SX, bool]:
     """An inertia as 3 x 3, and whether it was said as a scalar. Raises ValueError."""
     given = stacked(value)
     if isinstance(given, int | float) or (isinstance(given, ca.SX | ca.DM) and given.numel() == 1):
-        return ca.densify(ca.diag(ca.vertcat(0, 0, column(owner, "inertia", given, 1, symbols)))), True
-    return matrix(owner, "inertia", given, symbols), False
+        return ca.densify(ca.diag(ca.vertcat(0, 0, column(owner, "inertia", given, 1, known)))), True
+    return matrix(owner, "inertia", given, known), False
 
 
 def turning(body: Solid, q: ca.SX) -> ca.SX:

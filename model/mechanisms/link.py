@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -87,12 +87,12 @@ class Segment:
         return self.origin if self.revolute else self.origin + self.frame @ self.axis * q
 
 
-def segments_of(links: object, joints: Sequence[str], owner: str, symbols: Sequence[ca.SX]) -> tuple[Segment, ...]:
+def segments_of(links: object, joints: Sequence[str], owner: str, known: Set[int]) -> tuple[Segment, ...]:
     """The links of a tree, checked.
 
     joints   names of the joints, one per link
     owner    for messages
-    symbols  what they may depend on
+    known    symbols that they may depend on
     Raises ValueError, with the link's name and what was expected.
     """
     if not isinstance(links, list | tuple) or not all(isinstance(link, Link) for link in links):
@@ -101,7 +101,7 @@ def segments_of(links: object, joints: Sequence[str], owner: str, symbols: Seque
         raise ValueError(
             f"{owner}: links: expected {len(joints)}, one per joint ({', '.join(joints)}), got {len(links)}"
         )
-    made = tuple(_segment(link, len(links), f"{owner}: link {link.name!r}", symbols) for link in links)
+    made = tuple(_segment(link, len(links), f"{owner}: link {link.name!r}", known) for link in links)
     for start in made:
         seen, at = [start.name], start.parent
         while at >= 0:
@@ -161,13 +161,13 @@ def outwards(segments: Sequence[Segment]) -> list[int]:
     return sorted(range(len(segments)), key=depth)
 
 
-def _segment(link: Link, count: int, owner: str, symbols: Sequence[ca.SX]) -> Segment:
+def _segment(link: Link, count: int, owner: str, known: Set[int]) -> Segment:
     if link.joint not in ("revolute", "prismatic"):
         raise ValueError(f'{owner}: joint: expected "revolute" or "prismatic", got {link.joint!r}')
     if isinstance(link.parent, bool) or not isinstance(link.parent, int) or not -1 <= link.parent < count:
         raise ValueError(f"{owner}: parent: expected the index of a link, or -1 for the base, got {link.parent!r}")
-    inertia, planar = inertia_matrix(owner, link.inertia, symbols)
-    axis = _entries(owner, "axis", link.axis, symbols)
+    inertia, planar = inertia_matrix(owner, link.inertia, known)
+    axis = _entries(owner, "axis", link.axis, known)
     if axis.is_zero():
         raise ValueError(f"{owner}: axis: expected a direction, got {link.axis!r}")
     if not _along_one(axis):
@@ -178,11 +178,11 @@ def _segment(link: Link, count: int, owner: str, symbols: Sequence[ca.SX]) -> Se
         link.name,
         link.joint == "revolute",
         link.parent,
-        _entries(owner, "origin", link.origin, symbols),
-        _frame(owner, link.rpy, symbols),
+        _entries(owner, "origin", link.origin, known),
+        _frame(owner, link.rpy, known),
         axis,
-        _exact(owner, "mass", column(owner, "mass", link.mass, 1, symbols)),
-        _entries(owner, "com", link.com, symbols),
+        _exact(owner, "mass", column(owner, "mass", link.mass, 1, known)),
+        _entries(owner, "com", link.com, known),
         _exact(owner, "inertia", inertia),
         planar,
     )
@@ -197,13 +197,13 @@ def _exact(owner: str, what: str, value: ca.SX) -> ca.SX:
     return value
 
 
-def _entries(owner: str, what: str, value: object, symbols: Sequence[ca.SX]) -> ca.SX:
-    return _exact(owner, what, column(owner, what, stacked(value), 3, symbols))
+def _entries(owner: str, what: str, value: object, known: Set[int]) -> ca.SX:
+    return _exact(owner, what, column(owner, what, stacked(value), 3, known))
 
 
-def _frame(owner: str, rpy: object, symbols: Sequence[ca.SX]) -> ca.SX:
+def _frame(owner: str, rpy: object, known: Set[int]) -> ca.SX:
     """R = Rz(yaw) Ry(pitch) Rx(roll), quarter turns exact."""
-    roll, pitch, yaw = ca.vertsplit(column(owner, "rpy", stacked(rpy), 3, symbols))
+    roll, pitch, yaw = ca.vertsplit(column(owner, "rpy", stacked(rpy), 3, known))
 
     def cosine_and_sine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
         if not angle.is_constant():

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 import casadi as ca
 
-from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case
+from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case, symbols_of
 from springline.model.mechanisms.body import Body, Solid, kinetic_energy_of, potential_energy_of, solid
 from springline.model.mechanisms.link import Link, Segment, bodies_of, segments_of
 from springline.model.parameters import Joint, Parameter, Values
@@ -127,14 +127,15 @@ class Mechanism:
     def segments(self, p: Values) -> tuple[Segment, ...]:
         """The links, checked. Raises ValueError."""
         joints = [joint.name for joint in self.joints]
-        return segments_of(self.links(p), joints, f"mechanism {self.name}", list(p.values()))
+        return segments_of(self.links(p), joints, f"mechanism {self.name}", symbols_of(*p.values()))
 
     def checked_bodies(self, q: ca.SX, p: Values) -> list[Solid]:
         """The bodies as expressions. Raises ValueError."""
         owner, bodies = f"mechanism {self.name}: bodies", self.bodies(q, p)
         if not isinstance(bodies, list | tuple) or not bodies:
             raise ValueError(f"{owner}: expected a list of at least one Body, got {bodies!r}")
-        return [solid(body, f"{owner}[{i}]", [q, *p.values()]) for i, body in enumerate(bodies)]
+        known = symbols_of(q, *p.values())
+        return [solid(body, f"{owner}[{i}]", known) for i, body in enumerate(bodies)]
 
     def tip(self, q: ca.SX, p: Values) -> ca.SX | None:
         """Where the arm ends, 3 x 1, m, base axes; None for an arm that does not say."""

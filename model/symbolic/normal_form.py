@@ -30,6 +30,7 @@ class _Atoms:
     def __init__(self) -> None:
         self.sx: list[ca.SX] = []
         self.sine_of: dict[int, int] = {}  # atom of sin(a) -> atom of cos(a)
+        self.reduced: dict[Monomial, Polynomial] = {}  # found once, needed again and again
         self._index: dict[object, int] = {}
 
     def intern(self, key: object, expression: ca.SX) -> int:
@@ -68,20 +69,23 @@ def _multiply(a: Polynomial, b: Polynomial, atoms: _Atoms) -> Polynomial:
         raise TooManyTerms
     for left, u in a.items():
         for right, v in b.items():
-            _accumulate(result, _reduce(_merge(left, right), u * v, atoms))
+            _accumulate(result, _reduced(_merge(left, right), atoms), u * v)
     if len(result) > _MOST_TERMS:
         raise TooManyTerms
     return result
 
 
-def _reduce(monomial: Monomial, coefficient: float, atoms: _Atoms) -> Polynomial:
-    """Replace every sin(a)^2 by 1 - cos(a)^2."""
-    for atom, power in monomial:
-        if power >= 2 and atom in atoms.sine_of:
-            rest = tuple((a, k - 2 if a == atom else k) for a, k in monomial if a != atom or k > 2)
-            cosine = _merge(rest, ((atoms.sine_of[atom], 2),))
-            return _add(_reduce(rest, coefficient, atoms), _reduce(cosine, coefficient, atoms), -1.0)
-    return {monomial: coefficient}
+def _reduced(monomial: Monomial, atoms: _Atoms) -> Polynomial:
+    """A monomial with every sin(a)^2 replaced by 1 - cos(a)^2."""
+    if monomial not in atoms.reduced:
+        atoms.reduced[monomial] = {monomial: 1.0}
+        for atom, power in monomial:
+            if power >= 2 and atom in atoms.sine_of:
+                rest = tuple((a, k - 2 if a == atom else k) for a, k in monomial if a != atom or k > 2)
+                cosine = _merge(rest, ((atoms.sine_of[atom], 2),))
+                atoms.reduced[monomial] = _add(_reduced(rest, atoms), _reduced(cosine, atoms), -1.0)
+                break
+    return atoms.reduced[monomial]
 
 
 def _polynomials(function: ca.Function, symbols: ca.SX, atoms: _Atoms) -> list[Polynomial]:

@@ -24,7 +24,7 @@ from springline.model.drive import DRIVES, FRICTION, DriveKind
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE, Bounds
 from springline.model.structure import MotorStart, SignalKind, SignalShape, Structure
-from springline.model.system import System
+from springline.model.system import System, system_of
 from springline.runner.files import InputError, Problem, document_text, read_toml, shortened, unknown
 from springline.runner.scenario import schema
 from springline.runner.scenario.checking import Document, resolve, size_given
@@ -206,7 +206,7 @@ class Scenario:
 
     def system(self) -> System:
         """The System of the structure; the same object for equal structures."""
-        return _system(self.structure())
+        return system_of(self.structure())
 
     def tables(self) -> list[Spline]:
         """The signal tables, in the order of System.tables."""
@@ -561,11 +561,6 @@ def _overridden(source: str) -> str:
     return f"override of {source}"
 
 
-@lru_cache(maxsize=64)
-def _system(structure: Structure) -> System:
-    return System(structure)
-
-
 def per_run(slots: Slots, keys: Sequence[str], runs: int) -> Floats:
     """Some slots of each run, (runs, keys)."""
     result = np.empty((runs, len(keys)))
@@ -577,7 +572,7 @@ def per_run(slots: Slots, keys: Sequence[str], runs: int) -> Floats:
 @lru_cache(maxsize=64)
 def _numeric_keys(structure: Structure) -> dict[str, NumericKey]:
     """The numeric keys of a structure; who asks for every chunk of a sweep gets the same."""
-    system, keys = _system(structure), {}
+    system, keys = system_of(structure), {}
     groups: dict[str, list[str]] = {}
     for slot in system.slots:
         if slot.key.startswith("initial.") and _is_idle(slot.key, structure):

@@ -10,7 +10,8 @@ import ctypes
 import math
 import operator
 import random
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from pathlib import PurePosixPath
 from typing import Any
@@ -31,6 +32,8 @@ TIME_STEP = 1e-4
 """Step of the plant vectors, s."""
 
 Numbers = NDArray[Any]  # float64 or float32
+
+_LAST_ZEROS = re.compile(r"\.?0*p")
 
 
 class Overflow(ValueError):
@@ -54,22 +57,36 @@ class _Model:
 
     def __init__(self, export: Export, sources: Mapping[str, bytes]) -> None:
         flat = {PurePosixPath(path).name: content for path, content in sources.items()}
-        library = toolchain.build_library(flat, main=f"{export.prefix}_model.c", flags=("-O1",))
+        # Bits do not depend on the level, and the compiler takes a third of the time that it takes with -O1.
+        library = toolchain.build_library(flat, main=f"{export.prefix}_model.c", flags=("-O0",))
         self._handle = toolchain.load(library)
         self._export = export
         self.dtype = np.float64 if export.real == "double" else np.float32
         self._p = np.array([export.values[i] for i in export.tunable], self.dtype)
 
-    def __call__(self, name: str, *inputs: Numbers) -> list[Numbers]:
-        """The outputs of function `name` with the exported parameters."""
+    def __call__(self, name: str, *inputs: Numbers, into: Sequence[Numbers] | None = None) -> list[Numbers]:
+        """The outputs of function `name` with the exported parameters, row by row.
+
+        inputs  a row of numbers per call, or one row for all
+        into    where the outputs go, if not into new matrices: inputs of later rows may be among them
+        """
         function = self._export.system.function(name)
-        arrays = [np.ascontiguousarray(x, self.dtype) for x in inputs] + ([self._p] if len(self._p) else [])
-        results = [np.zeros(function.numel_out(i), self.dtype) for i in range(function.n_out())]
-        arguments, outputs = (
-            (ctypes.c_void_p * len(part))(*(x.ctypes.data for x in part)) for part in (arrays, results)
+        arrays = [np.ascontiguousarray(np.atleast_2d(x), self.dtype) for x in inputs]
+        arrays += [self._p[None]] if len(self._p) else []
+        rows = max(len(array) for array in arrays)
+        if into is None:
+            into = [np.zeros((rows, function.numel_out(i)), self.dtype) for i in range(function.n_out())]
+        places, results = (
+            [(array.ctypes.data, array.strides[0] if len(array) > 1 else 0) for array in part]
+            for part in (arrays, into)
         )
-        self._handle[f"{self._export.prefix}_{name}"](arguments, outputs, None, None, 0)
-        return results
+        call = self._handle[f"{self._export.prefix}_{name}"]
+        arguments, outputs = ((ctypes.c_void_p * len(part))() for part in (places, results))
+        for row in range(rows):
+            arguments[:] = [start + row * stride for start, stride in places]
+            outputs[:] = [start + row * stride for start, stride in results]
+            call(arguments, outputs, None, None, 0)
+        return list(into)
 
 
 def test_vectors(export: Export, interface: TypedInterface, sources: Mapping[str, bytes]) -> bytes:
@@ -85,8 +102,8 @@ def test_vectors(export: Export, interface: TypedInterface, sources: Mapping[str
     ]
     with np.errstate(all="ignore"):  # Overflow says more
         control = _finite(export, control_outputs(export), _control_rows(interface, model))
-        rows = [f"control {_hex(row)}" for row in control]
-        rows += [f"plant {_hex(row)}" for row in _finite(export, names["state"].split(), _plant_rows(interface, model))]
+        plant = _finite(export, names["state"].split(), _plant_rows(interface, model))
+    rows = [f"{kind} {_hex(row)}" for kind, part in (("control", control), ("plant", plant)) for row in part.tolist()]
     return "".join([*(f"# {line}\n" for line in lines), *(f"{row}\n" for row in rows)]).encode()
 
 
@@ -101,22 +118,17 @@ def control_outputs(export: Export) -> list[str]:
     return [entry.name for entry in entries(quantities, system.joints)]
 
 
-def _finite(export: Export, outputs: Sequence[str], rows: Iterable[list[float]]) -> Iterator[list[float]]:
-    """The rows, which end with `outputs`. Raises Overflow if one of these is not finite."""
-    for row in rows:
-        for name, value in zip(outputs, row[-len(outputs) :], strict=True):
-            if not math.isfinite(value):
-                raise Overflow(export, name)
-        yield row
+def _finite(export: Export, outputs: Sequence[str], rows: Numbers) -> Numbers:
+    """The rows, which end with `outputs`. Raises Overflow for the first of these that is not finite."""
+    wrong = np.argwhere(~np.isfinite(rows[:, -len(outputs) :]))
+    if len(wrong):
+        raise Overflow(export, outputs[wrong[0][1]])
+    return rows
 
 
 def _hex(numbers: Sequence[float]) -> str:
     """Hexadecimal floats without the zeros at their end."""
-    words = []
-    for number in numbers:
-        significand, exponent = float(number).hex().split("p")
-        words.append(f"{significand.rstrip('0').rstrip('.') if '.' in significand else significand}p{exponent}")
-    return " ".join(words)
+    return _LAST_ZEROS.sub("p", " ".join(map(float.hex, numbers)))
 
 
 class _Draw:
@@ -139,63 +151,64 @@ class _Draw:
         ]
 
 
-def _control_rows(interface: TypedInterface, model: _Model) -> Iterator[list[float]]:
+def _control_rows(interface: TypedInterface, model: _Model) -> Numbers:
     system = interface.export.system
     n, draw = system.n, _Draw()
-    z = np.array(system.z_start, model.dtype)  # the vectors are a sequence: what a sample leaves, the next one takes
+    drawn = np.array([
+        [
+            *draw.uniform(2.0, n), *draw.uniform(4.0, n), *draw.uniform(8.0, n),
+            *draw.small(1, n), *draw.small(2, n), *draw.small(0, n),
+        ]
+        for _ in range(CONTROL_VECTORS)
+    ])  # fmt: skip
+    q1d, dq1d, _, error, rate, stretching = np.split(drawn, 6, axis=1)
+    q1, dq1 = q1d - error, dq1d - rate
+    reference = drawn[:, : 3 * n].astype(model.dtype)
+    x = np.hstack([q1, dq1, q1, dq1 + stretching]).astype(model.dtype)[:, : system.x.numel()]
+    # The vectors are a sequence: what a sample leaves in z, the next one takes.
+    z = np.tile(np.array(system.z_start, model.dtype), (CONTROL_VECTORS + 1, 1))
+    before, after = z[:-1], z[1:]
+    seen = [*np.split(reference, 3, axis=1), x, *([before] if system.memory else [])]
+    if system.memory:
+        model("update", *seen, np.array([interface.export.period]), into=[after])
+    outputs = model("control", *seen)
     names = {field.name for field in interface.structures["measurement"]}
     measured = [k for k, field in enumerate(interface.structures["state"]) if field.name in names]
-    for _ in range(CONTROL_VECTORS):
-        q1d, dq1d, ddq1d = draw.uniform(2.0, n), draw.uniform(4.0, n), draw.uniform(8.0, n)
-        error, rate = draw.small(1, n), draw.small(2, n)
-        q1 = [a - b for a, b in zip(q1d, error, strict=True)]
-        dq1 = [a - b for a, b in zip(dq1d, rate, strict=True)]
-        dq2 = [a + b for a, b in zip(dq1, draw.small(0, n), strict=True)]
-        reference = np.array([*q1d, *dq1d, *ddq1d], model.dtype)
-        x = np.array([*q1, *dq1, *q1, *dq2][: system.x.numel()], model.dtype)
-        seen, before = [*np.split(reference, 3), x, *([z] if len(z) else [])], z
-        outputs = model("control", *seen)
-        flags = _limits_met(interface.export, model, outputs)
-        if len(z):
-            [z] = model("update", *seen, np.array([interface.export.period], model.dtype))
-        yield [*reference, *x[measured], *before, *(value for part in outputs for value in part), *flags, *z]
+    flags = _limits_met(interface.export, model, outputs)
+    return np.hstack([reference, x[:, measured], before, *outputs, *flags, after])
 
 
-def _limits_met(export: Export, model: _Model, outputs: Sequence[Numbers]) -> Iterator[float]:
-    """Per joint whether U_max has limited the command (0 or 1), then whether a_max has limited a reaching law.
+def _limits_met(export: Export, model: _Model, outputs: Sequence[Numbers]) -> Iterator[Numbers]:
+    """Whether U_max has limited the command (0 or 1), then whether a_max has limited a reaching law, by row and joint.
 
     outputs  of the model's control: the command, the parts it is the sum of, error, sliding variable
     """
     u, *parts = outputs[: 1 + len(export.system.command_parts)]
-    yield from (u != reduce(operator.add, parts)).astype(float)
+    yield (u != reduce(operator.add, parts)).astype(model.dtype)
     law = export.system.controller.law
     if law is None:
         return
-    for i, value in enumerate(outputs[-1]):
-        [wished] = model(f"law_{law.name}", np.array([value], model.dtype))
-        yield float(abs(wished[0]) > model.dtype(export.value(f"control.a_max.{i}")))
+    sigma = outputs[-1]
+    [wished] = model(f"law_{law.name}", sigma.reshape(-1, 1))
+    limits = [model.dtype(export.value(f"control.a_max.{i}")) for i in range(export.system.n)]
+    yield (np.abs(wished.reshape(sigma.shape)) > limits).astype(model.dtype)
 
 
-def _plant_rows(interface: TypedInterface, model: _Model) -> Iterator[list[float]]:
+def _plant_rows(interface: TypedInterface, model: _Model) -> Numbers:
     system, draw = interface.export.system, _Draw()
     n, coordinates = system.n, system.base.b.numel()
-    for _ in range(PLANT_VECTORS):
-        motion = [np.array(draw.uniform(bound, coordinates), model.dtype) for bound in (0.5, 1.0, 2.0)]
-        q1 = draw.uniform(2.0, n)
-        stretch = [value / 1024 for value in draw.uniform(4.0, n)]
-        x = np.array(
-            [*q1, *draw.uniform(4.0, n), *(a + b for a, b in zip(q1, stretch, strict=True)), *draw.uniform(4.0, n)][
-                : system.x.numel()
-            ],
-            model.dtype,
-        )
-        u = np.array(draw.uniform(2048.0, n), model.dtype)
-        motion += [np.array(draw.uniform(256.0, n), model.dtype)] if system.forces else []
-        yield [*np.concatenate(motion), *x, *u, *_runge_kutta(system.tableau, model, motion, x, u)]
+    bounds = [(0.5, coordinates), (1.0, coordinates), (2.0, coordinates)]
+    bounds += [(2.0, n), (4.0, n), (4.0, n), (4.0, n), (2048.0, n), *([(256.0, n)] if system.forces else [])]
+    drawn = np.array([[k for bound in bounds for k in draw.uniform(*bound)] for _ in range(PLANT_VECTORS)])
+    b, db, ddb, q1, stretch, dq1, dq2, u, *forces = np.split(drawn, np.cumsum([count for _, count in bounds])[:-1], 1)
+    x = np.hstack([q1, dq1, q1 + stretch / 1024, dq2])[:, : system.x.numel()]
+    motion = [part.astype(model.dtype) for part in (b, db, ddb, *forces)]
+    x, u = x.astype(model.dtype), u.astype(model.dtype)
+    return np.hstack([*motion, x, u, _runge_kutta(system.tableau, model, motion, x, u)])
 
 
 def _runge_kutta(tableau: Tableau, model: _Model, motion: Sequence[Numbers], x: Numbers, u: Numbers) -> Numbers:
-    """One step, operation by operation as the C does it; `motion` of the base, and forces behind it."""
+    """One step a row, operation by operation as the C does it; `motion` of the base, and forces behind it."""
     real = model.dtype
     h = real(TIME_STEP)
     slopes: list[Numbers] = []

@@ -27,7 +27,7 @@ from springline.codegen.export.fmu.variables import PARTS, Part, interface, part
 from springline.codegen.kernel import toolchain
 from springline.codegen.program import SignalTable
 from springline.model.structure import SignalShape, Structure
-from springline.model.system import System
+from springline.model.system import system_of
 
 __all__ = ["PARTS", "FmiVersion", "Part", "Settings", "fmu"]
 
@@ -64,7 +64,7 @@ def fmu(
     """
     if part != "controller" and structure.disturbance.kind == "none":
         structure = replace(structure, disturbance=SignalShape("input"))
-    system = System(structure)
+    system = system_of(structure)
     if len(tables) != len(system.tables):
         raise ValueError(f"{len(tables)} tables given, the system has {len(system.tables)}")
     wanted = bind(structure, values, tunable=tunable).tunable
