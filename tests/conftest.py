@@ -13,6 +13,7 @@ import casadi as ca
 import pytest
 from hypothesis import settings
 
+from springline.benchmarks.spatial_arm import SpatialArm
 from springline.model.mechanisms import MECHANISMS, Mechanism
 from springline.model.parameters import POSITIVE, Joint, Parameter, Values
 from springline.model.signals import SineTerm
@@ -165,8 +166,8 @@ OTHER_ARMS: tuple[Mechanism, ...] = (OneLink(), ThreeLinks(), Slider())
 
 @pytest.fixture
 def other_arms(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Arms with one and with three joints, known by name as the packaged ones are."""
-    for arm in OTHER_ARMS:
+    """Arms with one, three and (in space) seven joints, known by name as the packaged ones are."""
+    for arm in (*OTHER_ARMS, SpatialArm()):
         monkeypatch.setitem(MECHANISMS, arm.name, arm)
 
 

@@ -291,16 +291,19 @@ def test_any_chain_on_a_ship_is_the_same_everywhere(
         np.testing.assert_allclose(of_state_and_command(structure, first)[1, : 4 * n], stepped, atol=1e-12 * scale)
 
 
-@pytest.mark.parametrize("n", [1, 7])
-def test_a_planar_arm_on_a_ship_is_the_same_everywhere(n: int, tmp_path: Path) -> None:
-    structure = structure_of("planar_arm", size=n, reference=SignalShape("sine", (0,) * n), **SHIP)
+@pytest.mark.parametrize(("mechanism", "n"), [("planar_arm", 1), ("planar_arm", 7), ("spatial_arm", 7)])
+def test_an_arm_on_a_ship_is_the_same_everywhere(mechanism: str, n: int, tmp_path: Path) -> None:
+    """Lanes, one lane, CasADi's C, both FMUs, which are valid, and the exported step and plant step."""
+    structure = structure_of(mechanism, size=n if mechanism == "planar_arm" else 0, **SHIP)
     rows = rows_of(structure, True, width=4, groups=1)
     assert np.isfinite(rows).all()
-    np.testing.assert_array_equal(rows, rows_of(structure, True, engine="casadi"))
+    for options in ({"width": 1, "groups": 1}, {"engine": "casadi"}):
+        np.testing.assert_array_equal(rows_of(structure, True, **options), rows)
     expected = of_state_and_command(structure, rows)
     for version in (2, 3):
         np.testing.assert_array_equal(fmu_rows(structure, True, version, tmp_path), expected)
-    every = of_state_and_command(structure, rows_of(structure, True, every=100))
+        assert client_library("fmpy.validation").validate_fmu(str(tmp_path / f"arm{version}1.fmu")) == []
+    every = expected[::10]  # main.c prints one row in ten
     wanted = np.hstack([every[:, :n], every[:, 4 * n :]])
     np.testing.assert_array_equal(exported_rows(structure, tmp_path)[: len(wanted)], wanted)
 

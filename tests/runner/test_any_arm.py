@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from springline.codegen.kernel import source
 from springline.runner import batch, load_scenario, simulate
 from springline.runner.cli import app
 from springline.runner.files import InputError
@@ -17,8 +18,30 @@ pytestmark = pytest.mark.usefixtures("other_arms")
 SHORT = {"simulation.duration": 0.5, "simulation.step": 2e-4}
 
 
+SHIP = {
+    "kind": "sine",
+    "mount": [3.0, 2.0, 1.0],
+    **{
+        name: [{"amplitude": amplitude, "omega": 5.0}]
+        for names, amplitude in ((("surge", "sway", "heave"), 0.2), (("roll", "pitch", "yaw"), 0.05))
+        for name in names
+    },
+}
+# Seven joints, in a plane and in space, on a base in six coordinates.
+SEVEN = {
+    name: {"base_motion": SHIP, "simulation.duration": 0.04, **size}
+    for name, size in (("planar_arm", {"mechanism.n": 7}), ("spatial_arm", {}))
+}
+
+
+@pytest.fixture(autouse=True)
+def _kernels_that_are_compiled_quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of seven joints would take a minute."""
+    monkeypatch.setattr(source, "best_flags", lambda compiler: ("-O0",))
+
+
 def scenario_of(name: str, **changes: object):
-    return load_scenario("paper/nominal", {"mechanism.name": name, **SHORT, **changes})
+    return load_scenario("paper/nominal", {"mechanism.name": name, **SHORT, **SEVEN.get(name, {}), **changes})
 
 
 def test_a_scenario_of_another_arm_has_that_arms_names_and_defaults(other_arm: str) -> None:
@@ -40,15 +63,26 @@ def test_three_links_settle_on_their_reference() -> None:
         assert row[f"chatter_{joint}"] < 5.0
 
 
-def test_runs_of_a_batch_are_single_runs(other_arm: str) -> None:
+@pytest.mark.parametrize(
+    ("arm", "key", "drives"),
+    [
+        ("one_link", "plant.mass", ("elastic", "rigid")),
+        ("three_links", "plant.mass", ("elastic", "rigid")),
+        ("planar_arm", "plant.mass", ("elastic",)),
+        ("spatial_arm", "plant.mass1", ("elastic",)),
+    ],
+)
+def test_runs_of_a_batch_are_single_runs_of_either_engine(arm: str, key: str, drives: tuple[str, ...]) -> None:
     """Of numbers that are baked and tunable, and of a rigid drive."""
-    for drive in ("elastic", "rigid"):
-        scenario = scenario_of(other_arm, **{"drive.kind": drive})
+    for drive in drives:
+        scenario = scenario_of(arm, **{"drive.kind": drive})
         masses = np.array([0.8, 1.0, 1.3])
-        table = batch(scenario, {"plant.mass": masses}, jobs=1).to_pylist()
+        table = batch(scenario, {key: masses}, jobs=1).to_pylist()
         for mass, row in zip(masses, table, strict=True):
-            alone = simulate(scenario.with_overrides({"plant.mass": float(mass)})).metrics.to_pylist()[0]
-            assert {name: row[name] for name in alone} == alone
+            for engine in ("lanes", "casadi"):
+                alone = simulate(scenario.with_overrides({key: float(mass)}), engine=engine).metrics.to_pylist()[0]
+                assert alone["status"] == "ok"
+                assert {name: row[name] for name in alone} == alone
 
 
 SWEEP = """
@@ -58,17 +92,23 @@ seed = 4
 chunk = 2
 [vary]
 "control.delta" = { uniform = [0.04, 0.08] }
-"drive.kind" = { values = ["elastic", "rigid"] }
+"drive.kind" = { values = DRIVES }
 [keep]
 trajectories = 2
 """
 
 
-def test_sweep_and_replay_of_another_arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("arm", "drives"),
+    [("three_links", '["elastic", "rigid"]'), ("planar_arm", '["elastic"]'), ("spatial_arm", '["elastic"]')],
+)
+def test_sweep_and_replay_of_another_arm(
+    arm: str, drives: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Grouped by the kind of drive; a replayed run has the metrics of its row."""
     monkeypatch.chdir(tmp_path)
-    Path("arm.toml").write_text(scenario_of("three_links").to_toml())
-    Path("sweep.toml").write_text(SWEEP)
+    Path("arm.toml").write_text(scenario_of(arm).to_toml())
+    Path("sweep.toml").write_text(SWEEP.replace("DRIVES", drives))
     for command in (["batch", "sweep.toml", "-o", "data", "--no-plot"], ["replay", "data", "3", "--no-plot"]):
         done = CliRunner().invoke(app, command, prog_name="springline")
         assert done.exit_code == 0, done.output
