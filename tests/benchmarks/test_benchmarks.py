@@ -5,6 +5,7 @@ import importlib
 import json
 import math
 import platform
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,11 +16,22 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from springline.benchmarks import against, command, harness, math_speed, problem, roofline, same_bits, work_precision
+from springline.benchmarks import (
+    against,
+    command,
+    compile_time,
+    harness,
+    math_speed,
+    problem,
+    roofline,
+    same_bits,
+    work_precision,
+)
 from springline.benchmarks import report as bench
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, handwritten_c, ours
 from springline.codegen.kernel import KernelOptions, kernel
+from springline.runner import load_scenario
 
 TINY = harness.Effort(
     rounds=1, sample=1e-3, adaptive=problem.QUANTUM, compared=problem.QUANTUM, comparison=1e-3, compilers=False
@@ -108,6 +120,35 @@ def test_of_several_batch_sizes_the_fastest_is_shown() -> None:
 def test_compilers_are_timed_cold_and_cached() -> None:
     cold, cached = compile_times(handwritten_c.CONTENDERS[0])
     assert cold > cached >= 0.0
+
+
+def test_what_an_arm_takes_is_timed_step_by_step(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = {**compile_time.ARMS[compile_time.BARRED], "mechanism.n": 1}
+    monkeypatch.setenv("SPRINGLINE_CACHE", str(tmp_path))
+    monkeypatch.setitem(compile_time.ARMS, compile_time.BARRED, one)
+    found = compile_time.measure_arm(compile_time.BARRED)
+    assert all(seconds > 0.0 for seconds in found[1:])
+    for seconds, expected in ((3.0, 0), (4.0, 1)):
+        row = compile_time.Waiting(found.operations, seconds, seconds, seconds, seconds)
+        monkeypatch.setattr(compile_time, "waiting", lambda arm, row=row: row)
+        assert compile_time.main([]) == expected
+        assert f"{found.operations:,}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arm", "row"),
+    [
+        ("planar_arm, n = 7", "`planar_arm`, `n = 7`"),
+        ("spatial arm, 7 joints", "seven revolute joints in space, every"),
+    ],
+)
+def test_the_documents_have_the_operations_of_the_arms_that_are_timed(arm: str, row: str) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "own-arm.md").read_text("utf-8")
+    [shown] = re.findall(rf"^\| {re.escape(row)}.*\| ([\d,]+) \|$", page, re.MULTILINE)
+    system = load_scenario("paper/nominal", compile_time.ARMS[arm]).system()
+    assert f"{compile_time.operations_of_plant(system):,}" == shown
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="operations are counted in x86-64 machine code")
