@@ -291,7 +291,10 @@ def test_any_chain_on_a_ship_is_the_same_everywhere(
         np.testing.assert_allclose(of_state_and_command(structure, first)[1, : 4 * n], stepped, atol=1e-12 * scale)
 
 
-@pytest.mark.parametrize(("mechanism", "n"), [("planar_arm", 1), ("planar_arm", 7), ("spatial_arm", 7)])
+@pytest.mark.parametrize(
+    ("mechanism", "n"),
+    [("planar_arm", 1), ("planar_arm", 7), pytest.param("spatial_arm", 7, marks=pytest.mark.full)],  # slow to compile
+)
 def test_an_arm_on_a_ship_is_the_same_everywhere(mechanism: str, n: int, tmp_path: Path) -> None:
     """Lanes, one lane, CasADi's C, both FMUs, which are valid, and the exported step and plant step."""
     structure = structure_of(mechanism, size=n if mechanism == "planar_arm" else 0, **SHIP)

@@ -101,7 +101,11 @@ trajectories = 2
 
 @pytest.mark.parametrize(
     ("arm", "drives"),
-    [("three_links", '["elastic", "rigid"]'), ("planar_arm", '["elastic"]'), ("spatial_arm", '["elastic"]')],
+    [
+        ("three_links", '["elastic", "rigid"]'),
+        ("planar_arm", '["elastic"]'),
+        pytest.param("spatial_arm", '["elastic"]', marks=pytest.mark.full),
+    ],
 )
 def test_sweep_and_replay_of_another_arm(
     arm: str, drives: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
