@@ -27,7 +27,7 @@ enum { SPRINGLINE_READY = 0x5a17 }; /* springline_init has been here */
 
 const springline_config springline_default_config = {SPRINGLINE_FALLBACK_ZERO};
 
-const springline_real springline_base_nodes[SPRINGLINE_BASE_NODES] = {0.0, 0.5, 1.0};
+const springline_real springline_base_nodes[] = {0.0, 0.5, 1.0};
 
 static const springline_command springline_no_command = {0.0, 0.0};
 static const springline_diagnostics springline_no_diagnostics = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
