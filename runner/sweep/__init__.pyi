@@ -23,4 +23,4 @@ from .summary import Summary as Summary
 from .summary import markdown as markdown
 from .summary import summarize as summarize
 from .summary import summary_tables as summary_tables
-from .sweep import load_sweep as load_sweep
+from .sweep_file import load_sweep as load_sweep

@@ -29,7 +29,8 @@ from springline.runner.scenario import FOLDER as TABLES
 from springline.runner.sweep import sampling
 from springline.runner.sweep.dataset import Dataset
 from springline.runner.sweep.plan import Plan
-from springline.runner.sweep.sweep import Axis, sweep_from_json
+from springline.runner.sweep.sweep import Axis
+from springline.runner.sweep.sweep_file import sweep_from_json
 
 
 def stored_plan(dataset: Dataset, code: Sequence[Path] = ()) -> Plan:
