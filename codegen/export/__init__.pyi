@@ -6,7 +6,12 @@ from .bound import comment as comment
 from .bound import operations as operations
 from .bound import port_entries as port_entries
 from .bound import provenance as provenance
+from .names import LONGEST as LONGEST
+from .names import LONGEST_LINKED as LONGEST_LINKED
 from .names import check_files as check_files
+from .names import check_linked as check_linked
+from .registry import Target as Target
+from .registry import made_with as made_with
 from .registry import target_files as target_files
 from .registry import targets as targets
 from .scalar import Body as Body

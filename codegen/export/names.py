@@ -10,7 +10,12 @@ from collections.abc import Iterable
 
 from springline.codegen.program import KEYWORDS
 
-_LONGEST = 100
+LONGEST = 63
+"""Characters of a prefix: by so many C99 promises to tell the names inside a program apart (5.2.4.1)."""
+
+LONGEST_LINKED = 26
+"""Characters of a prefix whose names other files call: C99 promises that a linker tells names apart by 31, and
+<prefix>_start and <prefix>_status_text differ in the fifth behind the prefix."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -65,8 +70,7 @@ def check_prefix(prefix: str) -> None:
     lower = prefix.lower()
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
         raise ValueError(f"prefix {prefix!r} is no C identifier: letters, digits and _, a letter first")
-    if len(prefix) > _LONGEST:
-        raise ValueError(f"prefix {prefix[:20]!r}… has {len(prefix)} characters, expected {_LONGEST} at most")
+    _expect_length(prefix, LONGEST, "by so many C99 tells names apart")
     if "__" in prefix or prefix.endswith("_"):
         raise ValueError(
             f"prefix {prefix!r} would make names with two _ in a row, which C++ keeps: one _ inside is fine"
@@ -83,6 +87,20 @@ def check_prefix(prefix: str) -> None:
     for applies, reason in reasons:
         if applies:
             raise ValueError(f"prefix {prefix!r} {reason}: choose another, such as {'arm_' + prefix!r}")
+
+
+def check_linked(prefix: str) -> None:
+    """Raise ValueError for a prefix that leaves a linker too few characters to tell the interface's functions apart."""
+    _expect_length(
+        prefix,
+        LONGEST_LINKED,
+        "C99 promises that a linker tells names apart by their first 31, and the functions' names need the rest",
+    )
+
+
+def _expect_length(prefix: str, longest: int, why: str) -> None:
+    if len(prefix) > longest:
+        raise ValueError(f"prefix {prefix[:20]!r}… has {len(prefix)} characters, expected {longest} at most: {why}")
 
 
 def check_files(prefix: str, own: Iterable[str], others: Iterable[str]) -> None:

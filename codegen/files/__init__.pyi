@@ -10,4 +10,6 @@ from .manifest import check_tree as check_tree
 from .manifest import read_manifest as read_manifest
 from .manifest import summary as summary
 from .manifest import write_tree as write_tree
+from .templates import LINE as LINE
+from .templates import broken as broken
 from .templates import render as render

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import resources
 from itertools import groupby
@@ -24,6 +24,7 @@ LINE = 100
 _NARROWEST = 20  # columns that a comment behind a declaration needs; with less it stands above
 _DECLARATION = re.compile(r"( *)(?!/\*)(\S.*?) +/\* (.*) \*/")
 _COMMENT = re.compile(r"( *)/\* (.*) \*/")
+_BEHIND = re.compile(r"(.*; +)/\* (.*) \*/")
 _WHOLE = re.compile(r'"(?:[^"\\]|\\.)*"|/\*.*?\*/')  # nothing breaks inside a string or a comment
 
 
@@ -32,18 +33,21 @@ def render(folder: str, template: str, **values: Any) -> str:
 
     folder    the package whose folder templates/ has it: "springline.codegen.export.c"
     template  its file name; what is put into an .html.j2 or .xml.j2 is escaped
-    Raises jinja2.UndefinedError for a name that has no value.
+    A template that is not there is that of the package above: all targets begin their files with one banner.j2.
+    Raises jinja2.TemplateNotFound, and jinja2.UndefinedError for a name that has no value.
     """
     return _environment(folder).get_template(template).render(values)
 
 
 @cache
 def _environment(folder: str) -> Environment:
-    templates = resources.files(folder) / "templates"
-
-    def load(name: str) -> tuple[str, str, None]:
+    def load(name: str) -> tuple[str, str, None] | None:
         """Text, and the file that an error message names."""
-        return (templates / name).read_text(encoding="utf-8"), str(templates / name), None
+        for package in (folder, folder.rpartition(".")[0]):
+            file = resources.files(package) / "templates" / name if package else None
+            if file is not None and file.is_file():
+                return file.read_text(encoding="utf-8"), str(file), None
+        return None
 
     environment = Environment(
         loader=FunctionLoader(load),
@@ -97,41 +101,59 @@ def _column(lines: list[str]) -> Iterator[str]:
             yield from comment(match[3], len(match[1])).splitlines()
             yield declaration
             continue
-        first, *more = textwrap.wrap(match[3], room, break_long_words=False, break_on_hyphens=False)
-        below = [" " * (column + 3) + part for part in more]
-        yield from [f"{declaration:{column}}/* {first}", *below[:-1]] if below else []
-        yield f"{below[-1] if below else f'{declaration:{column}}/* {first}'} */"
+        yield from _continued(f"{declaration:{column}}", match[3])
 
 
 def fitted(text: str) -> str:
     """Lines of C, those that are too long broken between words, and their comments aligned."""
-    lines = (part for line in aligned(text).splitlines() for part in _broken(line))
-    return "".join(f"{line}\n" for line in lines)
+    return broken(aligned(text))
 
 
-def _broken(line: str) -> Iterator[str]:
-    if alone := _COMMENT.fullmatch(line):
-        yield from comment(alone[2], len(alone[1])).splitlines()
-        return
+def broken(text: str, breaks: Sequence[tuple[str, ...]] = ((" ", "("),)) -> str:
+    """Lines of C, those that are too long broken, a comment behind a statement continued in its column.
+
+    breaks  behind what a line may be broken, the better places first
+    """
+    return "".join(f"{part}\n" for line in text.splitlines() for part in _parts(line, breaks))
+
+
+def _parts(line: str, breaks: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    alone = _COMMENT.fullmatch(line)
+    if len(line) > LINE:
+        if alone and max(map(len, alone[2].split())) <= LINE - len(alone[1]) - len(" * "):
+            yield from comment(alone[2], len(alone[1])).splitlines()
+            return
+        if behind := _BEHIND.fullmatch(line):
+            yield from _continued(behind[1], behind[2])
+            return
     indent = len(line) - len(line.lstrip()) + 4
     mark = " \\" if line.startswith("#") else ""  # a directive ends with its line
     while len(line) > LINE:
-        whole = [match.span() for match in _WHOLE.finditer(line)]
-        end = next(
-            (
-                i
-                for i in range(LINE - len(mark), indent, -1)
-                if (line[i] == " " or line[i - 1] == "(")
-                and not line.endswith("return", 0, i)  # it stays with its value
-                and not any(start < i < stop for start, stop in whole)
-            ),
-            None,
-        )
-        if end is None:
+        room = LINE - len(mark)
+        whole = [] if alone else [match.span() for match in _WHOLE.finditer(line)]
+        ends = {k: len(line[:k].rstrip()) for k in range(indent + 1, room + 2)}
+        places = [
+            k
+            for k, end in ends.items()
+            if end <= room
+            and not line.endswith("return", 0, end)  # it stays with its value
+            and not any(start < end < stop for start, stop in whole)
+        ]
+        found = ([k for k in places if line.endswith(signs, indent, k)] for signs in breaks)
+        place = max(next(filter(None, found), []), default=None)
+        if place is None:
             break
-        yield line[:end].rstrip() + mark
-        line = " " * indent + line[end:].lstrip()
+        yield line[:place].rstrip() + mark
+        line = " " * indent + line[place:].lstrip()
     yield line
+
+
+def _continued(statement: str, remark: str) -> Iterator[str]:
+    """A statement with the comment behind it, which goes on below itself; `statement` ends where it begins."""
+    column = len(statement)
+    first, *more = textwrap.wrap(remark, LINE - column - len("/*  */"), break_long_words=False, break_on_hyphens=False)
+    lines = [f"{statement}/* {first}", *(" " * (column + 3) + part for part in more)]
+    yield from [*lines[:-1], f"{lines[-1]} */"]
 
 
 def quoted(text: str, indent: int) -> str:

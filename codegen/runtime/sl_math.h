@@ -39,10 +39,10 @@
 /* 2: long double, negative: unknown; with 1 and with the values from 16 on double arithmetic is
  * double */
 #if defined(FLT_EVAL_METHOD) && \
-    (FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD == 2 || FLT_EVAL_METHOD > 64)
+    ((FLT_EVAL_METHOD < 0) || (FLT_EVAL_METHOD == 2) || (FLT_EVAL_METHOD > 64))
 #error "sl_math.h needs doubles evaluated as double: on x86 compile with -msse2 -mfpmath=sse"
 #endif
-typedef char sl_double_has_the_size_of_uint64_t[sizeof(double) == sizeof(uint64_t) ? 1 : -1];
+typedef char sl_double_has_the_size_of_uint64_t[(sizeof(double) == sizeof(uint64_t)) ? 1 : -1];
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
 #endif
@@ -97,18 +97,18 @@ static inline int sl_not(int m) { return !m; }
 static inline int sl_any(int m) { return m != 0; }
 static inline int sl_all(int m) { return m != 0; }
 /* b if the top bit of `at` is set, else a */
-static inline double sl_pick(uint64_t at, double a, double b) { return (at >> 63) != 0 ? b : a; }
+static inline double sl_pick(uint64_t at, double a, double b) { return ((at >> 63) != 0) ? b : a; }
 /* a < limit, unsigned */
 static inline int sl_below(uint64_t a, uint64_t limit) { return a < limit; }
-static inline double sl_fmin(double a, double b) { return a < b ? a : b; }
-static inline double sl_fmax(double a, double b) { return a > b ? a : b; }
+static inline double sl_fmin(double a, double b) { return (a < b) ? a : b; }
+static inline double sl_fmax(double a, double b) { return (a > b) ? a : b; }
 
 /* The correctly rounded root in integers, digit by digit, for targets without a square-root
  * instruction. */
 static inline double sl_sqrt_soft(double x) {
   uint64_t m = sl_bits(x), root = 0, twice = 0, digit;
   int e;
-  if (!(x > 0.0)) return x == 0.0 ? x : SL_NAN;
+  if (!(x > 0.0)) return (x == 0.0) ? x : SL_NAN;
   if (m >= SL_EXPONENT) return x;
   e = (int)(m >> 52);
   if (e == 0) {
@@ -132,7 +132,7 @@ static inline double sl_sqrt_soft(double x) {
     m <<= 1;
   }
   if (m != 0) root += root & 1; /* never a tie: the root of a 53-bit number has no 54-bit end */
-  return sl_real((root >> 1) + ((uint64_t)(e / 2 + 1022) << 52));
+  return sl_real((root >> 1) + ((uint64_t)((e / 2) + 1022) << 52));
 }
 
 #if defined(SL_SOFT_SQRT)
@@ -244,19 +244,19 @@ static inline SL_F SL_FN(ceil)(SL_F x) {
 #ifdef SL_SCALAR
 SL_RARE double sl_hypot_rare(double x, double y) {
   double a = sl_fabs(x), b = sl_fabs(y), s;
-  if (a == SL_INF || b == SL_INF) return SL_INF;
-  if (a != a || b != b) return a + b;
-  s = sl_fmax(a, b) > 1.0 ? 0x1p600 : 0x1p-600;
+  if ((a == SL_INF) || (b == SL_INF)) return SL_INF;
+  if ((a != a) || (b != b)) return a + b;
+  s = (sl_fmax(a, b) > 1.0) ? 0x1p600 : 0x1p-600;
   a /= s;
   b /= s;
-  return sl_sqrt(a * a + b * b) * s;
+  return sl_sqrt((a * a) + (b * b)) * s;
 }
 #endif
 SL_DEFINE_PATCH2(hypot_rare)
 #endif
 
 static inline SL_F SL_CHECKED(hypot)(SL_F x, SL_F y SL_OK) {
-  SL_F q = x * x + y * y, r = SL_FN(sqrt)(q);
+  SL_F q = (x * x) + (y * y), r = SL_FN(sqrt)(q);
   SL_PATCH2((q > 0x1p-900) & (q < 0x1p1000), r, hypot_rare, x, y);
   return r;
 }
@@ -269,26 +269,26 @@ static inline SL_F SL_CHECKED(hypot)(SL_F x, SL_F y SL_OK) {
 /* rl + r^2 P(r) */
 static inline SL_F SL_FN(exp_tail)(SL_F rh, SL_F rl) {
   SL_F r = rh + rl, r2 = r * r, r4 = r2 * r2;
-  SL_F p01 = 0x1.000000000000cp-1 + r * 0x1.5555555555561p-3;
-  SL_F p23 = 0x1.555555554ff92p-5 + r * 0x1.111111110d5cep-7;
-  SL_F p45 = 0x1.6c16c185cac53p-10 + r * 0x1.a01a01bb06d7ep-13;
-  SL_F p67 = 0x1.a0199630e5d3fp-16 + r * 0x1.71dddf79ade3cp-19;
-  SL_F p89 = 0x1.28b0a6e418617p-22 + r * 0x1.af860aa738e43p-26;
-  return rl + r2 * ((p01 + r2 * p23) + r4 * ((p45 + r2 * p67) + r4 * p89));
+  SL_F p01 = 0x1.000000000000cp-1 + (r * 0x1.5555555555561p-3);
+  SL_F p23 = 0x1.555555554ff92p-5 + (r * 0x1.111111110d5cep-7);
+  SL_F p45 = 0x1.6c16c185cac53p-10 + (r * 0x1.a01a01bb06d7ep-13);
+  SL_F p67 = 0x1.a0199630e5d3fp-16 + (r * 0x1.71dddf79ade3cp-19);
+  SL_F p89 = 0x1.28b0a6e418617p-22 + (r * 0x1.af860aa738e43p-26);
+  return rl + (r2 * ((p01 + (r2 * p23)) + (r4 * ((p45 + (r2 * p67)) + (r4 * p89)))));
 }
 
 /* exp(hi + lo) for |hi| < 708, where k can be added to the exponent. */
 static inline SL_F SL_FN(exp_sum)(SL_F hi, SL_F lo) {
-  SL_F t = hi * 0x1.71547652b82fep+0 + SL_ROUND, k = t - SL_ROUND, rh = hi - k * SL_LN2_HI;
-  SL_F m = 1.0 + (rh + SL_FN(exp_tail)(rh, lo - k * SL_LN2_LO));
+  SL_F t = (hi * 0x1.71547652b82fep+0) + SL_ROUND, k = t - SL_ROUND, rh = hi - (k * SL_LN2_HI);
+  SL_F m = 1.0 + (rh + SL_FN(exp_tail)(rh, lo - (k * SL_LN2_LO)));
   return SL_FN(real)(SL_FN(bits)(m) + (SL_FN(bits)(t) << 52));
 }
 
 /* exp(x) - 1 = 2^k (1 + r + ...) - 1 for |x| < 708, and in *lo what its rounding left over.  s =
  * 2^k: s - 1 and s rh are added while both are exact or nearly so. */
 static inline SL_F SL_FN(expm1_sum)(SL_F x, SL_F *lo) {
-  SL_F t = x * 0x1.71547652b82fep+0 + SL_ROUND, k = t - SL_ROUND, rh = x - k * SL_LN2_HI;
-  SL_F s = SL_FN(real)((SL_FN(bits)(t) << 52) + SL_ONE), a = (s - 1.0) + s * rh;
+  SL_F t = (x * 0x1.71547652b82fep+0) + SL_ROUND, k = t - SL_ROUND, rh = x - (k * SL_LN2_HI);
+  SL_F s = SL_FN(real)((SL_FN(bits)(t) << 52) + SL_ONE), a = (s - 1.0) + (s * rh);
   SL_F b = s * SL_FN(exp_tail)(rh, k * -SL_LN2_LO), r = a + b;
   *lo = (a - r) + b;
   return r;
@@ -300,16 +300,18 @@ static inline double sl_exp_sum_rare(double hi, double lo, int shift) {
   double k, rh;
   if (hi > 711.0) return SL_INF;
   if (hi < -746.0) return 0.0;
-  k = (hi * 0x1.71547652b82fep+0 + SL_ROUND) - SL_ROUND;
-  rh = hi - k * SL_LN2_HI;
-  return sl_scale(1.0 + (rh + sl_exp_tail(rh, lo - k * SL_LN2_LO)), (int)k + shift);
+  k = ((hi * 0x1.71547652b82fep+0) + SL_ROUND) - SL_ROUND;
+  rh = hi - (k * SL_LN2_HI);
+  return sl_scale(1.0 + (rh + sl_exp_tail(rh, lo - (k * SL_LN2_LO))), (int)k + shift);
 }
 
-SL_RARE double sl_exp_rare(double x) { return x != x ? x : sl_exp_sum_rare(x, 0.0, 0); }
+SL_RARE double sl_exp_rare(double x) { return (x != x) ? x : sl_exp_sum_rare(x, 0.0, 0); }
 SL_RARE double sl_expm1_rare(double x) {
-  return x != x ? x : x < 0.0 ? -1.0 : sl_exp_sum_rare(x, 0.0, 0);
+  return (x != x) ? x : (x < 0.0) ? -1.0 : sl_exp_sum_rare(x, 0.0, 0);
 }
-SL_RARE double sl_cosh_rare(double x) { return x != x ? x : sl_exp_sum_rare(sl_fabs(x), 0.0, -1); }
+SL_RARE double sl_cosh_rare(double x) {
+  return (x != x) ? x : sl_exp_sum_rare(sl_fabs(x), 0.0, -1);
+}
 SL_RARE double sl_sinh_rare(double x) { return sl_copysign(sl_cosh_rare(x), x); }
 #endif
 SL_DEFINE_PATCH1(exp_rare)
@@ -319,7 +321,7 @@ SL_DEFINE_PATCH1(sinh_rare)
 #endif
 
 static inline SL_F SL_CHECKED(exp)(SL_F x SL_OK) {
-  SL_F t = x * 0x1.71547652b82fep+0 + SL_ROUND, k = t - SL_ROUND, rh = x - k * SL_LN2_HI;
+  SL_F t = (x * 0x1.71547652b82fep+0) + SL_ROUND, k = t - SL_ROUND, rh = x - (k * SL_LN2_HI);
   SL_F m = 1.0 + (rh + SL_FN(exp_tail)(rh, k * -SL_LN2_LO));
   SL_F r = SL_FN(real)(SL_FN(bits)(m) + (SL_FN(bits)(t) << 52));
   SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, exp_rare, x);
@@ -333,7 +335,7 @@ static inline SL_F SL_CHECKED(expm1)(SL_F x SL_OK) {
 }
 
 static inline SL_F SL_CHECKED(cosh)(SL_F x SL_OK) {
-  SL_F e = SL_FN(exp_sum)(SL_FN(fabs)(x), SL_FN(set)(0.0)), r = 0.5 * e + 0.5 / e;
+  SL_F e = SL_FN(exp_sum)(SL_FN(fabs)(x), SL_FN(set)(0.0)), r = (0.5 * e) + (0.5 / e);
   SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, cosh_rare, x);
   return r;
 }
@@ -342,7 +344,7 @@ static inline SL_F SL_CHECKED(cosh)(SL_F x SL_OK) {
  * enters to first order. */
 static inline SL_F SL_CHECKED(sinh)(SL_F x SL_OK) {
   SL_F lo, e = SL_FN(expm1_sum)(SL_FN(fabs)(x), &lo), u = 1.0 + e, q = e / u, v = 1.0 - q;
-  SL_F r = 0.5 * (e + (q + (lo * (1.0 + v * v) - q * v * (e - (u - 1.0)))));
+  SL_F r = 0.5 * (e + (q + ((lo * (1.0 + (v * v))) - (q * v * (e - (u - 1.0))))));
   r = SL_FN(copysign)(r, x);
   SL_PATCH1(SL_FN(fabs)(x) < 708.0, r, sinh_rare, x);
   return r;
@@ -356,7 +358,7 @@ static inline SL_F SL_FN(tanh)(SL_F x) {
            u = 2.0 + e;
   SL_M small = a < 0.55;
   SL_F q = SL_FN(select)(small, e, SL_FN(set)(2.0)) / u, v = 0.5 * (1.0 - q);
-  SL_F r = SL_FN(select)(small, q + v * (2.0 * v * lo - q * (e - (u - 2.0))), 1.0 - q);
+  SL_F r = SL_FN(select)(small, q + (v * ((2.0 * v * lo) - (q * (e - (u - 2.0))))), 1.0 - q);
   return SL_FN(copysign)(r, x);
 }
 #endif
@@ -368,17 +370,19 @@ static inline SL_F SL_FN(tanh)(SL_F x) {
 /* k ln2_hi + lo + log(1 + f) */
 static inline SL_F SL_FN(log_sum)(SL_F k, SL_F f, SL_F lo) {
   SL_F s = f / (2.0 + f), z = s * s, w = z * z, half = 0.5 * f * f;
-  SL_F p = (0x1.5555555555592p-1 + z * 0x1.999999997fd37p-2) +
-           w * ((0x1.24924941f8d20p-2 + z * 0x1.c71c5202b27cdp-3) +
-                w * ((0x1.7466405bfb1c1p-3 + z * 0x1.39a1933386ffcp-3) + w * 0x1.2f0705ae6bc4fp-3));
-  return k * SL_LN2_HI - ((half - (s * (half + z * p) + lo)) - f);
+  SL_F p =
+      (0x1.5555555555592p-1 + (z * 0x1.999999997fd37p-2)) +
+      (w *
+       ((0x1.24924941f8d20p-2 + (z * 0x1.c71c5202b27cdp-3)) +
+        (w * ((0x1.7466405bfb1c1p-3 + (z * 0x1.39a1933386ffcp-3)) + (w * 0x1.2f0705ae6bc4fp-3)))));
+  return (k * SL_LN2_HI) - ((half - ((s * (half + (z * p))) + lo)) - f);
 }
 
 #ifdef SL_SCALAR
 SL_RARE double sl_log_rare(double x) {
   uint64_t b, shifted;
   double k;
-  if (x != x || x == SL_INF) return x;
+  if ((x != x) || (x == SL_INF)) return x;
   if (x == 0.0) return -SL_INF;
   if (x < 0.0) return SL_NAN;
   b = sl_bits(x * 0x1p54);
@@ -401,7 +405,7 @@ static inline SL_F SL_CHECKED(log)(SL_F x SL_OK) {
 #ifdef SL_CORES
 #ifdef SL_SCALAR
 /* x <= -1, NaN, or so large (2^1000) that 1 is nothing to it */
-SL_RARE double sl_log1p_rare(double x) { return x > 1.0 ? sl_log(x) : sl_log_rare(1.0 + x); }
+SL_RARE double sl_log1p_rare(double x) { return (x > 1.0) ? sl_log(x) : sl_log_rare(1.0 + x); }
 #endif
 SL_DEFINE_PATCH1(log1p_rare)
 #endif
@@ -413,7 +417,7 @@ static inline SL_F SL_CHECKED(log1p)(SL_F x SL_OK) {
   SL_F k = SL_EXPONENT_OF(shifted) - SL_FIELD_BIAS,
        scale = SL_FN(real)(SL_ONE - (shifted & ~SL_FRACTION));
   SL_F xs = x * scale, one = scale - 1.0, f = xs + one, lost = (one - f) + xs;
-  SL_F r = SL_FN(log_sum)(k, f, k * SL_LN2_LO + lost);
+  SL_F r = SL_FN(log_sum)(k, f, (k * SL_LN2_LO) + lost);
   r = SL_FN(real)(SL_FN(bits)(r) | (SL_FN(bits)(x) & SL_SIGN_BIT));
   SL_PATCH1(SL_FN(below)(shifted + (SL_SQRT_HALF - UINT64_C(0x3c90000000000000)),
                          UINT64_C(0x41f0000000000000)),
@@ -428,8 +432,8 @@ static inline SL_F SL_CHECKED(log1p)(SL_F x SL_OK) {
 #ifdef SL_SCALAR
 static inline void sl_mul64(uint64_t a, uint64_t b, uint64_t *hi, uint64_t *lo) {
   uint64_t a0 = a & 0xffffffffu, a1 = a >> 32, b0 = b & 0xffffffffu, b1 = b >> 32;
-  uint64_t low = a0 * b0, mid = a1 * b0 + (low >> 32), mid2 = a0 * b1 + (mid & 0xffffffffu);
-  *hi = a1 * b1 + (mid >> 32) + (mid2 >> 32);
+  uint64_t low = a0 * b0, mid = (a1 * b0) + (low >> 32), mid2 = (a0 * b1) + (mid & 0xffffffffu);
+  *hi = (a1 * b1) + (mid >> 32) + (mid2 >> 32);
   *lo = (mid2 << 32) | (low & 0xffffffffu);
 }
 
@@ -454,14 +458,14 @@ SL_RARE uint64_t sl_reduce_rare(double x, double *hi, double *lo) {
     return 0;
   }
   for (i = 0; i < 3; i++) { /* the bits before `first` weigh whole turns */
-    int word = first / 64 + i, bit = first % 64;
-    t[i] = bit == 0 ? two_over_pi[word]
-                    : (two_over_pi[word] << bit) | (two_over_pi[word + 1] >> (64 - bit));
+    int word = (first / 64) + i, bit = first % 64;
+    t[i] = (bit == 0) ? two_over_pi[word]
+                      : ((two_over_pi[word] << bit) | (two_over_pi[word + 1] >> (64 - bit)));
   }
   sl_mul64(m, t[2], &h, &p2); /* p = m t modulo 2^192; 2^190 is a quarter turn */
   sl_mul64(m, t[1], &n, &l);
   p1 = l + h;
-  p0 = m * t[0] + n + (p1 < l);
+  p0 = (m * t[0]) + n + (p1 < l);
   n = p0 >> 62;
   p0 = (p0 << 2) | (p1 >> 62);
   p1 = (p1 << 2) | (p2 >> 62);
@@ -471,7 +475,7 @@ SL_RARE uint64_t sl_reduce_rare(double x, double *hi, double *lo) {
     p1 = ~p1;
     sign ^= SL_SIGN_BIT;
   }
-  for (shift = 0; (p0 >> 63) == 0 && shift < 63; shift++) {
+  for (shift = 0; ((p0 >> 63) == 0) && (shift < 63); shift++) {
     p0 = (p0 << 1) | (p1 >> 63);
     p1 <<= 1;
   }
@@ -479,18 +483,18 @@ SL_RARE uint64_t sl_reduce_rare(double x, double *hi, double *lo) {
   unit = sl_real((uint64_t)(1023 - 63 - shift) << 52);
   *hi = sl_copysign((double)(h >> 11) * 0x1p11 * unit, sl_real(sign));
   *lo = sl_copysign((double)(h & 0x7ff) * unit, sl_real(sign));
-  return (b & SL_SIGN_BIT) != 0 ? 0 - n : n;
+  return ((b & SL_SIGN_BIT) != 0) ? (0 - n) : n;
 }
 #endif
 #endif
 
 /* n in the low bits of the result */
 static inline SL_B SL_CHECKED(reduce)(SL_F x, SL_F *hi, SL_F *lo SL_OK) {
-  SL_F t = x * 0x1.45f306dc9c883p-1 + SL_ROUND, k = t - SL_ROUND;
-  SL_F a = x - k * 0x1.921fb54440000p+0, b = k * 0x1.68c234c4c0000p-39, r = a - b;
+  SL_F t = (x * 0x1.45f306dc9c883p-1) + SL_ROUND, k = t - SL_ROUND;
+  SL_F a = x - (k * 0x1.921fb54440000p+0), b = k * 0x1.68c234c4c0000p-39, r = a - b;
   SL_B n = SL_FN(bits)(t);
   *hi = r;
-  *lo = ((a - r) - b) - k * 0x1.98a2e03707345p-77;
+  *lo = ((a - r) - b) - (k * 0x1.98a2e03707345p-77);
   SL_PATCH_REDUCE(SL_FN(fabs)(x) < 0x1p17, x, hi, lo, n);
   return n;
 }
@@ -503,14 +507,14 @@ static inline void SL_CHECKED(sincos)(SL_F x, SL_F *sine, SL_F *cosine SL_OK) {
   w = z * z;
   v = z * r;
   half = 0.5 * z;
-  s = (-0x1.5555555555549p-3 + z * 0x1.111111110f87ap-7) +
-      w * ((-0x1.a01a019c11992p-13 + z * 0x1.71de3577b6633p-19) +
-           w * (-0x1.ae5e663a62750p-26 + z * 0x1.5d9300ee9c9afp-33));
-  c = (0x1.555555555554cp-5 + z * -0x1.6c16c16c1517ep-10) +
-      w * ((0x1.a01a019cb1bd8p-16 + z * -0x1.27e4f809f0783p-22) +
-           w * (0x1.1ee9ebe91257dp-29 + z * -0x1.8fae9c690c6dcp-37));
-  s = r - ((half * y - y) - v * s);
-  c = 1.0 - (half - (w * c - r * y));
+  s = (-0x1.5555555555549p-3 + (z * 0x1.111111110f87ap-7)) +
+      (w * ((-0x1.a01a019c11992p-13 + (z * 0x1.71de3577b6633p-19)) +
+            (w * (-0x1.ae5e663a62750p-26 + (z * 0x1.5d9300ee9c9afp-33)))));
+  c = (0x1.555555555554cp-5 + (z * -0x1.6c16c16c1517ep-10)) +
+      (w * ((0x1.a01a019cb1bd8p-16 + (z * -0x1.27e4f809f0783p-22)) +
+            (w * (0x1.1ee9ebe91257dp-29 + (z * -0x1.8fae9c690c6dcp-37)))));
+  s = r - (((half * y) - y) - (v * s));
+  c = 1.0 - (half - ((w * c) - (r * y)));
   *sine = SL_FN(real)(SL_FN(bits)(SL_FN(pick)(odd, s, c)) ^ (upper & SL_SIGN_BIT));
   *cosine = SL_FN(real)(SL_FN(bits)(SL_FN(pick)(odd, c, s)) ^ ((upper ^ odd) & SL_SIGN_BIT));
 }
@@ -534,23 +538,23 @@ static inline SL_F SL_CHECKED(tan)(SL_F x SL_OK) {
   z = r * r;
   w = z * z;
   w2 = w * w;
-  p = ((0x1.555555555555ep-2 + z * 0x1.111111111055ap-3) +
-       w * (0x1.ba1ba1bac4c32p-5 + z * 0x1.664f485c1bab1p-6)) +
-      w2 * (((0x1.226e3a9e886fbp-7 + z * 0x1.d6d2e39832e19p-9) +
-             w * (0x1.7db1c05e29ffap-10 + z * 0x1.34ba7d4ef2468p-11)) +
-            w2 * (((0x1.ff4176552c0b4p-13 + z * 0x1.5e2b7a21d8bd5p-14) +
-                   w * (0x1.1a619f52cd4e0p-14 + z * -0x1.afb387026147cp-16)) +
-                  w2 * ((0x1.98753227f4433p-15 + z * -0x1.9784455fb73b8p-16) +
-                        w * 0x1.48d6819ff4912p-17)));
+  p = ((0x1.555555555555ep-2 + (z * 0x1.111111111055ap-3)) +
+       (w * (0x1.ba1ba1bac4c32p-5 + (z * 0x1.664f485c1bab1p-6)))) +
+      (w2 * (((0x1.226e3a9e886fbp-7 + (z * 0x1.d6d2e39832e19p-9)) +
+              (w * (0x1.7db1c05e29ffap-10 + (z * 0x1.34ba7d4ef2468p-11)))) +
+             (w2 * (((0x1.ff4176552c0b4p-13 + (z * 0x1.5e2b7a21d8bd5p-14)) +
+                     (w * (0x1.1a619f52cd4e0p-14 + (z * -0x1.afb387026147cp-16)))) +
+                    (w2 * ((0x1.98753227f4433p-15 + (z * -0x1.9784455fb73b8p-16)) +
+                           (w * 0x1.48d6819ff4912p-17)))))));
   u = r * z * p;
   t = r + u;
-  u = u + y * (1.0 + t * t);
+  u = u + (y * (1.0 + (t * t)));
   t = r + u;
   tl = u - (t - r);
   th = SL_FN(real)(SL_FN(bits)(t) & SL_HIGH_26);
   q = -1.0 / t;
   qh = SL_FN(real)(SL_FN(bits)(q) & SL_HIGH_26);
-  q = qh + q * ((1.0 + qh * th) + qh * ((t - th) + tl));
+  q = qh + (q * ((1.0 + (qh * th)) + (qh * ((t - th) + tl))));
   return SL_FN(select)(x == 0.0, x, SL_FN(pick)(n << 63, t, q));
 }
 
@@ -559,7 +563,8 @@ static inline SL_F SL_CHECKED(tan)(SL_F x SL_OK) {
 /* The angle in [0, pi/2] whose tangent is y / x, both positive: atan c + atan t with c = 0, 1/2, 1,
  * 3/2 or infinite, c = b / a and t = (a y - b x) / (a x + b y), |t| <= 7/16. */
 static inline SL_F SL_FN(angle)(SL_F y, SL_F x) {
-  SL_M m1 = y >= 0.4375 * x, m2 = y >= 0.6875 * x, m3 = y >= 1.1875 * x, m4 = y >= 2.4375 * x;
+  SL_M m1 = y >= (0.4375 * x), m2 = y >= (0.6875 * x), m3 = y >= (1.1875 * x),
+       m4 = y >= (2.4375 * x);
   SL_F a = SL_FN(select)(m4, SL_FN(set)(0.0),
                          SL_FN(select)(m2, SL_FN(set)(1.0), SL_FN(set)(1.0) + SL_FN(true)(m1)));
   SL_F b = SL_FN(select)(m4, SL_FN(set)(1.0), SL_FN(select)(m3, SL_FN(set)(1.5), SL_FN(true)(m1)));
@@ -572,16 +577,16 @@ static inline SL_F SL_FN(angle)(SL_F y, SL_F x) {
   lo = SL_FN(select)(m3, SL_FN(set)(0x1.007887af0cbbdp-56), lo);
   hi = SL_FN(select)(m4, SL_FN(set)(0x1.921fb54442d18p+0), hi);
   lo = SL_FN(select)(m4, SL_FN(set)(0x1.1a62633145c07p-54), lo);
-  t = (a * y - b * x) / (a * x + b * y);
+  t = ((a * y) - (b * x)) / ((a * x) + (b * y));
   z = t * t;
   w = z * z;
-  p = (-0x1.555555555550cp-2 + z * 0x1.999999998e9bcp-3) +
-      w * ((-0x1.2492491ffcd99p-3 + z * 0x1.c71c6fde2bd99p-4) +
-           w * ((-0x1.745cdbebc1a5fp-4 + z * 0x1.3b0f2453d8041p-4) +
-                w * ((-0x1.10d625585003ep-4 + z * 0x1.dddf46d42df51p-5) +
-                     w * ((-0x1.97a61cc5ac210p-5 + z * 0x1.2b228d2b176c3p-5) +
-                          w * -0x1.0a908cd5e801ap-6))));
-  return hi + (t + (lo + t * z * p));
+  p = (-0x1.555555555550cp-2 + (z * 0x1.999999998e9bcp-3)) +
+      (w * ((-0x1.2492491ffcd99p-3 + (z * 0x1.c71c6fde2bd99p-4)) +
+            (w * ((-0x1.745cdbebc1a5fp-4 + (z * 0x1.3b0f2453d8041p-4)) +
+                  (w * ((-0x1.10d625585003ep-4 + (z * 0x1.dddf46d42df51p-5)) +
+                        (w * ((-0x1.97a61cc5ac210p-5 + (z * 0x1.2b228d2b176c3p-5)) +
+                              (w * -0x1.0a908cd5e801ap-6)))))))));
+  return hi + (t + (lo + (t * z * p)));
 }
 
 static inline SL_F SL_FN(atan)(SL_F x) {
@@ -594,15 +599,15 @@ static inline SL_F SL_FN(atan)(SL_F x) {
  */
 SL_RARE double sl_atan2_rare(double y, double x) {
   double a = sl_fabs(y), b = sl_fabs(x), most = sl_fmax(a, b), r;
-  double scale = most > 0x1p1000 ? 0x1p-100 : most < 0x1p-900 ? 0x1p100 : 1.0;
-  if (x != x || y != y) return x + y;
-  if (a == SL_INF || b == SL_INF) {
+  double scale = (most > 0x1p1000) ? 0x1p-100 : (most < 0x1p-900) ? 0x1p100 : 1.0;
+  if ((x != x) || (y != y)) return x + y;
+  if ((a == SL_INF) || (b == SL_INF)) {
     a = sl_true(a == SL_INF);
     b = sl_true(b == SL_INF);
     scale = 1.0;
   }
-  if (a != 0.0 && b == 0.0) return sl_copysign(0x1.921fb54442d18p+0, y);
-  r = a == 0.0 ? 0.0 : sl_angle(a * scale, b * scale);
+  if ((a != 0.0) && (b == 0.0)) return sl_copysign(0x1.921fb54442d18p+0, y);
+  r = (a == 0.0) ? 0.0 : sl_angle(a * scale, b * scale);
   if ((sl_bits(x) & SL_SIGN_BIT) != 0) r = 0x1.921fb54442d18p+1 - (r - 0x1.1a62633145c07p-53);
   return sl_copysign(r, y);
 }
@@ -612,12 +617,14 @@ SL_DEFINE_PATCH2(atan2_rare)
 /* P of asin s = s + s^3 P(s^2), 0 <= s^2 <= 1/4, times s^2 */
 static inline SL_F SL_FN(asin_tail)(SL_F z) {
   SL_F w = z * z;
-  return z * ((0x1.5555555555384p-3 + z * 0x1.333333336fdcfp-4) +
-              w * ((0x1.6db6db419c1aep-5 + z * 0x1.f1c72c7fb16b6p-6) +
-                   w * ((0x1.6e89edb72d898p-6 + z * 0x1.1c6c42d843f7ep-6) +
-                        w * ((0x1.c6f65bee06e06p-7 + z * 0x1.8ef2e7d389800p-7) +
-                             w * ((0x1.aa363bb0cc3e7p-8 + z * 0x1.41091db8c8729p-6) +
-                                  w * (-0x1.0b7fe0b5d7d56p-6 + z * 0x1.05feb94ced0f5p-5))))));
+  return z *
+         ((0x1.5555555555384p-3 + (z * 0x1.333333336fdcfp-4)) +
+          (w *
+           ((0x1.6db6db419c1aep-5 + (z * 0x1.f1c72c7fb16b6p-6)) +
+            (w * ((0x1.6e89edb72d898p-6 + (z * 0x1.1c6c42d843f7ep-6)) +
+                  (w * ((0x1.c6f65bee06e06p-7 + (z * 0x1.8ef2e7d389800p-7)) +
+                        (w * ((0x1.aa363bb0cc3e7p-8 + (z * 0x1.41091db8c8729p-6)) +
+                              (w * (-0x1.0b7fe0b5d7d56p-6 + (z * 0x1.05feb94ced0f5p-5))))))))))));
 }
 
 /* From 1/2 on by asin x = pi/2 - 2 asin s, s = sqrt((1 - x) / 2) = sh + sl. */
@@ -627,11 +634,11 @@ static inline SL_F SL_FN(asin)(SL_F x) {
   z = SL_FN(select)(small, a * a, 0.5 * (1.0 - a));
   s = SL_FN(sqrt)(z);
   sh = SL_FN(real)(SL_FN(bits)(s) & SL_HIGH_26);
-  sl = (z - sh * sh) / SL_FN(fmax)(SL_FN(set)(DBL_MIN), s + sh);
+  sl = (z - (sh * sh)) / SL_FN(fmax)(SL_FN(set)(DBL_MIN), s + sh);
   tail = SL_FN(asin_tail)(z);
-  p = 2.0 * s * tail - (0x1.1a62633145c07p-54 - 2.0 * sl);
-  q = 0x1.921fb54442d18p-1 - 2.0 * sh;
-  return SL_FN(copysign)(SL_FN(select)(small, a + a * tail, 0x1.921fb54442d18p-1 - (p - q)), x);
+  p = (2.0 * s * tail) - (0x1.1a62633145c07p-54 - (2.0 * sl));
+  q = 0x1.921fb54442d18p-1 - (2.0 * sh);
+  return SL_FN(copysign)(SL_FN(select)(small, a + (a * tail), 0x1.921fb54442d18p-1 - (p - q)), x);
 }
 
 static inline SL_F SL_FN(acos)(SL_F x) {
@@ -640,12 +647,12 @@ static inline SL_F SL_FN(acos)(SL_F x) {
   z = SL_FN(select)(small, a * a, 0.5 * (1.0 - a));
   s = SL_FN(sqrt)(z);
   sh = SL_FN(real)(SL_FN(bits)(s) & SL_HIGH_26);
-  sl = (z - sh * sh) / SL_FN(fmax)(SL_FN(set)(DBL_MIN), s + sh);
+  sl = (z - (sh * sh)) / SL_FN(fmax)(SL_FN(set)(DBL_MIN), s + sh);
   tail = SL_FN(asin_tail)(z);
   w = s * tail;
   r = SL_FN(select)(x < 0.0, 0x1.921fb54442d18p+0 - (s + (w - 0x1.1a62633145c07p-54)),
                     sh + (w + sl));
-  return SL_FN(select)(small, 0x1.921fb54442d18p+0 - (x - (0x1.1a62633145c07p-54 - x * tail)),
+  return SL_FN(select)(small, 0x1.921fb54442d18p+0 - (x - (0x1.1a62633145c07p-54 - (x * tail))),
                        r + r);
 }
 #endif
@@ -666,12 +673,13 @@ static inline SL_F SL_CHECKED(atan2)(SL_F y, SL_F x SL_OK) {
 #ifdef SL_CORES
 static inline SL_F SL_FN(rcbrt_parts)(SL_F x, SL_F *d) {
   SL_F t = SL_FN(real)((SL_FN(bits)(x) >> 20) | UINT64_C(0x4330000000000000));
-  SL_F y = SL_FN(real)(SL_FN(bits)(0x1.55aa943ece2a5p+52 - t * 0x1.5555555555555p-2) << 20);
-  SL_F h = 1.0 - x * (y * y * y);
-  y = y + (y * h) * (0x1.5553d34e15d9fp-2 + h * (0x1.c9afb5eeada12p-3 + h * 0x1.65cc774f45369p-3));
+  SL_F y = SL_FN(real)(SL_FN(bits)(0x1.55aa943ece2a5p+52 - (t * 0x1.5555555555555p-2)) << 20);
+  SL_F h = 1.0 - (x * (y * y * y));
+  y = y + ((y * h) *
+           (0x1.5553d34e15d9fp-2 + (h * (0x1.c9afb5eeada12p-3 + (h * 0x1.65cc774f45369p-3)))));
   y = SL_FN(real)(SL_FN(bits)(y) & UINT64_C(0xfffffff000000000));
-  h = 1.0 - x * (y * y * y);
-  *d = h * (0x1.5555555555555p-2 + h * (0x1.c71c71c71c71cp-3 + h * 0x1.61f9add3c0ca4p-3));
+  h = 1.0 - (x * (y * y * y));
+  *d = h * (0x1.5555555555555p-2 + (h * (0x1.c71c71c71c71cp-3 + (h * 0x1.61f9add3c0ca4p-3))));
   return y;
 }
 
@@ -679,24 +687,24 @@ static inline SL_F SL_FN(rcbrt_parts)(SL_F x, SL_F *d) {
  * leading products are exact, x cut to 19 or 26 bits for that, and the small rest is added last. */
 static inline SL_F SL_FN(m1_3_sum)(SL_F x) {
   SL_F d, y = SL_FN(rcbrt_parts)(x, &d);
-  return y + y * d;
+  return y + (y * d);
 }
 
 static inline SL_F SL_FN(m2_3_sum)(SL_F x) {
   SL_F d, y = SL_FN(rcbrt_parts)(x, &d), y2 = y * y;
-  return y2 + y2 * (d + d + d * d);
+  return y2 + (y2 * (d + d + (d * d)));
 }
 
 static inline SL_F SL_FN(p1_3_sum)(SL_F x) {
   SL_F d, y = SL_FN(rcbrt_parts)(x, &d), y2 = y * y;
   SL_F xh = SL_FN(real)(SL_FN(bits)(x) & UINT64_C(0xfffffffc00000000));
-  return xh * y2 + ((x - xh) * y2 + (x * y2) * (d + d + d * d));
+  return (xh * y2) + (((x - xh) * y2) + ((x * y2) * (d + d + (d * d))));
 }
 
 static inline SL_F SL_FN(p2_3_sum)(SL_F x) {
   SL_F d, y = SL_FN(rcbrt_parts)(x, &d);
   SL_F xh = SL_FN(real)(SL_FN(bits)(x) & SL_HIGH_26);
-  return xh * y + ((x - xh) * y + (x * y) * d);
+  return (xh * y) + (((x - xh) * y) + ((x * y) * d));
 }
 
 #ifdef SL_SCALAR
@@ -705,10 +713,10 @@ static inline SL_F SL_FN(p2_3_sum)(SL_F x) {
 SL_RARE double sl_thirds_rare(double x, int thirds) {
   double scale, back; /* (scale x)^(1/3) back = x^(1/3) */
   if (x != x) return x;
-  if (x == 0.0 || sl_fabs(x) == SL_INF) return (x == 0.0) == (thirds > 0) ? 0.0 : SL_INF;
+  if ((x == 0.0) || (sl_fabs(x) == SL_INF)) return ((x == 0.0) == (thirds > 0)) ? 0.0 : SL_INF;
   if (x < 0.0) return SL_NAN;
-  scale = x < 1.0 ? 0x1p600 : 0x1p-600;
-  back = x < 1.0 ? 0x1p-200 : 0x1p200;
+  scale = (x < 1.0) ? 0x1p600 : 0x1p-600;
+  back = (x < 1.0) ? 0x1p-200 : 0x1p200;
   switch (thirds) {
     case 1: return sl_p1_3_sum(x * scale) * back;
     case 2: return sl_p2_3_sum(x * scale) * (back * back);
@@ -808,19 +816,19 @@ static inline void SL_FN(pow_log)(SL_B shifted, SL_F y, double bias, SL_F *hi, S
       SL_FN(pick)(second, SL_FN(set)(0x1.7b7679c3bb462p-2), SL_FN(set)(0x1.0ff923a807833p-1)));
   SL_F f = m - c, u = m + c, v = 1.0 / u, s = f * v;
   SL_F sh = SL_FN(real)(SL_FN(bits)(s) & SL_HIGH_26), uh = SL_FN(real)(SL_FN(bits)(u) & SL_HIGH_26);
-  SL_F sl = ((f - sh * uh) - sh * (m - (uh - c))) * v;
+  SL_F sl = ((f - (sh * uh)) - (sh * (m - (uh - c)))) * v;
   SL_F ds = (sh - s) + sl; /* s + ds is the better s */
   SL_F z = s * s, w = z * z;
-  SL_F p = (0x1.5555555555555p-1 + z * 0x1.9999999999ac0p-2) +
-           w * ((0x1.2492492413f3bp-2 + z * 0x1.c71c74dd75d28p-3) +
-                w * (0x1.745845c8bb19fp-3 + z * 0x1.3eba96fda56c4p-3));
+  SL_F p = (0x1.5555555555555p-1 + (z * 0x1.9999999999ac0p-2)) +
+           (w * ((0x1.2492492413f3bp-2 + (z * 0x1.c71c74dd75d28p-3)) +
+                 (w * (0x1.745845c8bb19fp-3 + (z * 0x1.3eba96fda56c4p-3)))));
   SL_F kl = k * SL_LN2_HI, t = kl + log_c, tl = (kl - t) + log_c;
-  SL_F sh2 = sh + sh, h = t + sh2, rest = (tl + k * SL_LN2_LO) + ((sl + sl) + (z + z) * ds);
-  SL_F l = (((t - h) + sh2) + rest) + (s * z) * p;
+  SL_F sh2 = sh + sh, h = t + sh2, rest = (tl + (k * SL_LN2_LO)) + ((sl + sl) + ((z + z) * ds));
+  SL_F l = (((t - h) + sh2) + rest) + ((s * z) * p);
   SL_F lh = SL_FN(real)(SL_FN(bits)(h + l) & SL_HIGH_26), ll = (h - lh) + l;
   SL_F yh = SL_FN(real)(SL_FN(bits)(y) & SL_HIGH_26);
   *hi = yh * lh;
-  *lo = y * ll + (y - yh) * lh;
+  *lo = (y * ll) + ((y - yh) * lh);
 }
 
 #ifdef SL_SCALAR
@@ -829,21 +837,21 @@ static inline int sl_parity(double y) {
   double a = sl_fabs(y), h = 0.5 * a;
   if (a >= 0x1p53) return 2;
   if (sl_floor(a) != a) return 0;
-  return sl_floor(h) == h ? 2 : 1;
+  return (sl_floor(h) == h) ? 2 : 1;
 }
 
 /* C99 F.9.4.4, then the general case with every scaling. */
 SL_RARE double sl_pow_rare(double x, double y) {
   double a = sl_fabs(x), hi, lo, bias = SL_FIELD_BIAS, r;
   int parity;
-  if (y == 0.0 || x == 1.0) return 1.0;
-  if (x != x || y != y) return x + y;
-  if (sl_fabs(y) == SL_INF) return a == 1.0 ? 1.0 : (a > 1.0) == (y > 0.0) ? SL_INF : 0.0;
+  if ((y == 0.0) || (x == 1.0)) return 1.0;
+  if ((x != x) || (y != y)) return x + y;
+  if (sl_fabs(y) == SL_INF) return (a == 1.0) ? 1.0 : ((a > 1.0) == (y > 0.0)) ? SL_INF : 0.0;
   parity = sl_parity(y);
-  if (a == 0.0 || a == SL_INF) {
-    r = (a == 0.0) == (y > 0.0) ? 0.0 : SL_INF;
+  if ((a == 0.0) || (a == SL_INF)) {
+    r = ((a == 0.0) == (y > 0.0)) ? 0.0 : SL_INF;
   } else {
-    if (x < 0.0 && parity == 0) return SL_NAN;
+    if ((x < 0.0) && (parity == 0)) return SL_NAN;
     if (a < DBL_MIN) {
       a *= 0x1p54;
       bias += 54.0;
@@ -851,7 +859,7 @@ SL_RARE double sl_pow_rare(double x, double y) {
     sl_pow_log(sl_bits(a) - SL_POW_START, y, bias, &hi, &lo);
     r = sl_exp_sum_rare(hi, lo, 0);
   }
-  return parity == 1 ? sl_copysign(r, x) : r;
+  return (parity == 1) ? sl_copysign(r, x) : r;
 }
 #endif
 SL_DEFINE_PATCH2(pow_rare)

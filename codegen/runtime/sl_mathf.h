@@ -28,7 +28,7 @@
 #error "sl_mathf.h needs floats evaluated as float: on x86 -msse2 -mfpmath=sse, on s390x \
 -fexcess-precision=fast"
 #endif
-typedef char slf_float_has_the_size_of_uint32_t[sizeof(float) == sizeof(uint32_t) ? 1 : -1];
+typedef char slf_float_has_the_size_of_uint32_t[(sizeof(float) == sizeof(uint32_t)) ? 1 : -1];
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
 #endif
@@ -70,8 +70,8 @@ static inline float slf_real(uint32_t b) {
 static inline int slf_not(int m) { return !m; }
 static inline float slf_if(int m, float a) { return m ? a : 0.0f; }
 static inline float slf_true(int m) { return m ? 1.0f : 0.0f; }
-static inline float slf_fmin(float a, float b) { return a < b ? a : b; }
-static inline float slf_fmax(float a, float b) { return a > b ? a : b; }
+static inline float slf_fmin(float a, float b) { return (a < b) ? a : b; }
+static inline float slf_fmax(float a, float b) { return (a > b) ? a : b; }
 static inline float slf_sq(float x) { return x * x; }
 static inline float slf_fabs(float x) { return slf_real(slf_bits(x) & ~SLF_SIGN_BIT); }
 static inline int slf_isfinite(float x) { return (slf_bits(x) & SLF_EXPONENT) != SLF_EXPONENT; }
@@ -81,14 +81,14 @@ static inline float slf_copysign(float x, float sign) {
 }
 
 /* -1, 1, or x itself where x is a zero or NaN. */
-static inline float slf_sign(float x) { return x > 0.0f ? 1.0f : x < 0.0f ? -1.0f : x; }
+static inline float slf_sign(float x) { return (x > 0.0f) ? 1.0f : (x < 0.0f) ? -1.0f : x; }
 
 /* The correctly rounded root by integer arithmetic alone, digit by digit, for targets without a
  * square-root instruction. */
 static inline float slf_sqrt_soft(float x) {
   uint32_t m = slf_bits(x), root = 0, twice = 0, digit;
   int e;
-  if (!(x > 0.0f)) return x == 0.0f ? x : SLF_NAN;
+  if (!(x > 0.0f)) return (x == 0.0f) ? x : SLF_NAN;
   if (m >= SLF_EXPONENT) return x;
   e = (int)(m >> 23);
   if (e == 0) {
@@ -112,7 +112,7 @@ static inline float slf_sqrt_soft(float x) {
     m <<= 1;
   }
   if (m != 0) root += root & 1; /* never a tie: the root of a 24-bit number has no 25-bit end */
-  return slf_real((root >> 1) + ((uint32_t)(e / 2 + 126) << 23));
+  return slf_real((root >> 1) + ((uint32_t)((e / 2) + 126) << 23));
 }
 
 #if defined(SL_SOFT_SQRT)
@@ -148,27 +148,27 @@ static inline float slf_sqrt(float x) { return slf_sqrt_soft(x); }
 static inline float slf_floor(float x) {
   float shift = slf_copysign(0x1p23f, x), n = (x + shift) - shift;
   n = n - slf_if(n > x, 1.0f);
-  return slf_fabs(x) < 0x1p23f ? slf_copysign(n, x) : x;
+  return (slf_fabs(x) < 0x1p23f) ? slf_copysign(n, x) : x;
 }
 
 static inline float slf_ceil(float x) {
   float shift = slf_copysign(0x1p23f, x), n = (x + shift) - shift;
   n = n + slf_if(n < x, 1.0f);
-  return slf_fabs(x) < 0x1p23f ? slf_copysign(n, x) : x;
+  return (slf_fabs(x) < 0x1p23f) ? slf_copysign(n, x) : x;
 }
 
 SLF_RARE float slf_hypot_rare(float x, float y) {
   float a = slf_fabs(x), b = slf_fabs(y), s;
-  if (a == SLF_INF || b == SLF_INF) return SLF_INF;
-  if (a != a || b != b) return a + b;
-  s = slf_fmax(a, b) > 1.0f ? 0x1p70f : 0x1p-70f;
+  if ((a == SLF_INF) || (b == SLF_INF)) return SLF_INF;
+  if ((a != a) || (b != b)) return a + b;
+  s = (slf_fmax(a, b) > 1.0f) ? 0x1p70f : 0x1p-70f;
   a /= s;
   b /= s;
-  return slf_sqrt(a * a + b * b) * s;
+  return slf_sqrt((a * a) + (b * b)) * s;
 }
 
 static inline float slf_hypot(float x, float y) {
-  float q = x * x + y * y;
+  float q = (x * x) + (y * y);
   return SLF_LIKELY((q > 0x1p-90f) & (q < 0x1p120f)) ? slf_sqrt(q) : slf_hypot_rare(x, y);
 }
 
@@ -176,14 +176,15 @@ static inline float slf_hypot(float x, float y) {
  * hi + lo = k ln 2 + r with |r| <= ln 2 / 2.  exp(r) = 1 + a + b, where a is the exact leading part
  * of r and b holds what is left of r and r^2 P(r).  On return *t = k + SLF_ROUND. */
 static inline void slf_exp_parts(float hi, float lo, float *t, float *a, float *b) {
-  float n = hi * 0x1.715476p+0f + SLF_ROUND, k = n - SLF_ROUND;
-  float rh = hi - k * 0x1.62e4p-1f, rl = lo - k * 0x1.7f7d1cp-20f;
+  float n = (hi * 0x1.715476p+0f) + SLF_ROUND, k = n - SLF_ROUND;
+  float rh = hi - (k * 0x1.62e4p-1f), rl = lo - (k * 0x1.7f7d1cp-20f);
   float r = rh + rl, r2 = r * r;
-  float p = (0.5f + r * 0x1.555556p-3f) + r2 * ((0x1.5554e4p-5f + r * 0x1.1110ep-7f) +
-                                                r2 * (0x1.6d492p-10f + r * 0x1.a12a42p-13f));
+  float p =
+      (0.5f + (r * 0x1.555556p-3f)) + (r2 * ((0x1.5554e4p-5f + (r * 0x1.1110ep-7f)) +
+                                             (r2 * (0x1.6d492p-10f + (r * 0x1.a12a42p-13f)))));
   *t = n;
   *a = rh;
-  *b = rl + r2 * p;
+  *b = rl + (r2 * p);
 }
 
 /* exp(hi + lo) for |hi| < 87, where the exponent can be added to the bits. */
@@ -206,9 +207,9 @@ static inline float slf_exp_sum_rare(float hi, float lo) {
          slf_real((uint32_t)(k - half + 127) << 23);
 }
 
-SLF_RARE float slf_exp_rare(float x) { return x != x ? x : slf_exp_sum_rare(x, 0.0f); }
+SLF_RARE float slf_exp_rare(float x) { return (x != x) ? x : slf_exp_sum_rare(x, 0.0f); }
 SLF_RARE float slf_expm1_rare(float x) {
-  return x != x ? x : x < 0.0f ? -1.0f : slf_exp_sum_rare(x, 0.0f);
+  return (x != x) ? x : (x < 0.0f) ? -1.0f : slf_exp_sum_rare(x, 0.0f);
 }
 
 static inline float slf_exp(float x) {
@@ -220,7 +221,7 @@ static inline float slf_expm1(float x) {
   if (!SLF_LIKELY(slf_fabs(x) < 87.0f)) return slf_expm1_rare(x);
   slf_exp_parts(x, 0.0f, &t, &a, &b);
   s = slf_real((slf_bits(t) << 23) + UINT32_C(0x3f800000));
-  return slf_copysign(((s - 1.0f) + s * a) + s * b, x);
+  return slf_copysign(((s - 1.0f) + (s * a)) + (s * b), x);
 }
 
 /* ---- log, log1p ---------------------------------------------------------------------------------
@@ -230,8 +231,10 @@ static inline float slf_expm1(float x) {
 /* k ln 2 + log(1 + f) + lo */
 static inline float slf_log_sum(float k, float f, float lo) {
   float s = f / (2.0f + f), z = s * s, half = 0.5f * f * f;
-  float p = (0x1.555556p-1f + z * 0x1.9999ecp-2f) + (z * z) * (0x1.245c44p-2f + z * 0x1.ddcedp-3f);
-  return k * 0x1.62e4p-1f - ((half - (s * (half + z * p) + (k * 0x1.7f7d1cp-20f + lo))) - f);
+  float p =
+      (0x1.555556p-1f + (z * 0x1.9999ecp-2f)) + ((z * z) * (0x1.245c44p-2f + (z * 0x1.ddcedp-3f)));
+  return (k * 0x1.62e4p-1f) -
+         ((half - ((s * (half + (z * p))) + ((k * 0x1.7f7d1cp-20f) + lo))) - f);
 }
 
 /* What the exponent field of the shifted bits counts, of an x that was multiplied by 2^scaled. */
@@ -247,7 +250,7 @@ static inline float slf_log_of(float x, int scaled) {
 }
 
 SLF_RARE float slf_log_rare(float x) {
-  if (x != x || x == SLF_INF) return x;
+  if ((x != x) || (x == SLF_INF)) return x;
   if (x == 0.0f) return -SLF_INF;
   if (x < 0.0f) return SLF_NAN;
   return slf_log_of(x * 0x1p25f, 25);
@@ -257,7 +260,7 @@ static inline float slf_log(float x) {
   return SLF_LIKELY((x >= FLT_MIN) & (x <= FLT_MAX)) ? slf_log_of(x, 0) : slf_log_rare(x);
 }
 
-SLF_RARE float slf_log1p_rare(float x) { return x > 1.0f ? slf_log(x) : slf_log_rare(1.0f + x); }
+SLF_RARE float slf_log1p_rare(float x) { return (x > 1.0f) ? slf_log(x) : slf_log_rare(1.0f + x); }
 
 /* 1 + x = u + c exactly; c goes where it still counts: into f, and what f cannot hold to first
  * order behind it. */
@@ -269,7 +272,7 @@ static inline float slf_log1p(float x) {
   d = c * slf_real(UINT32_C(0x3f800000) - kk);
   f = m + d;
   lost = (m - f) + d;
-  return slf_copysign(slf_log_sum(slf_exponent(shifted, 0), f, lost * (1.0f - f + f * f)), x);
+  return slf_copysign(slf_log_sum(slf_exponent(shifted, 0), f, lost * (1.0f - f + (f * f))), x);
 }
 
 /* ---- sin, cos, tan ------------------------------------------------------------------------------
@@ -292,13 +295,13 @@ SLF_RARE uint32_t slf_reduce_rare(float x, float *hi, float *lo) {
   }
   /* 96 bits of 2/pi; those before them weigh multiples of 4 quarters of a turn */
   for (i = 0; i < 3; i++) {
-    int word = first / 32 + i, bit = first % 32;
-    t[i] = bit == 0 ? two_over_pi[word]
-                    : (two_over_pi[word] << bit) | (two_over_pi[word + 1] >> (32 - bit));
+    int word = (first / 32) + i, bit = first % 32;
+    t[i] = (bit == 0) ? two_over_pi[word]
+                      : ((two_over_pi[word] << bit) | (two_over_pi[word + 1] >> (32 - bit)));
   }
   low = (uint64_t)m * t[2];
-  mid = (uint64_t)m * t[1] + (low >> 32);
-  p = ((uint64_t)(uint32_t)(m * t[0] + (uint32_t)(mid >> 32)) << 32) | (uint32_t)mid;
+  mid = ((uint64_t)m * t[1]) + (low >> 32);
+  p = ((uint64_t)(uint32_t)((m * t[0]) + (uint32_t)(mid >> 32)) << 32) | (uint32_t)mid;
   n = (uint32_t)(p >> 62);
   p = (p << 2) | ((uint32_t)low >> 30);
   if ((p >> 63) != 0) { /* beyond the half: take the next quarter, go back */
@@ -306,7 +309,7 @@ SLF_RARE uint32_t slf_reduce_rare(float x, float *hi, float *lo) {
     sign = SLF_SIGN_BIT;
     p = ~p;
   }
-  for (shift = 0; (p >> 63) == 0 && shift < 40; shift++) p <<= 1;
+  for (shift = 0; ((p >> 63) == 0) && (shift < 40); shift++) p <<= 1;
   p = (p >> 32) * UINT64_C(0xc90fdaa2); /* pi/2 in units of 2^-31 */
   *hi = slf_real(slf_bits((float)(uint32_t)(p >> 40) * slf_real((uint32_t)(104 - shift) << 23)) ^
                  sign);
@@ -325,16 +328,16 @@ SLF_RARE uint32_t slf_reduce_rare(float x, float *hi, float *lo) {
 static inline uint32_t slf_reduce(float x, float *hi, float *lo) {
   float t, n, a, b, c, d, e, f;
   if (!SLF_LIKELY(slf_fabs(x) < 0x1p13f)) return slf_reduce_rare(x, hi, lo);
-  t = x * 0x1.45f306p-1f + SLF_ROUND;
+  t = (x * 0x1.45f306p-1f) + SLF_ROUND;
   n = t - SLF_ROUND;
-  a = x - n * 0x1.92p+0f;
+  a = x - (n * 0x1.92p+0f);
   b = n * 0x1.fb4p-12f;
   c = a - b;
   d = (a - c) - b;
   e = n * 0x1.444p-24f;
   f = c - e;
   *hi = f;
-  *lo = ((c - f) - e) + (d - n * 0x1.68c234p-39f);
+  *lo = ((c - f) - e) + (d - (n * 0x1.68c234p-39f));
   return slf_bits(t);
 }
 
@@ -343,13 +346,14 @@ static inline void slf_sincos(float x, float *sine, float *cosine) {
   uint32_t n = slf_reduce(x, &r, &y);
   z = r * r;
   half = 0.5f * z;
-  s = (-0x1.555556p-3f + z * 0x1.11110ep-7f) + (z * z) * (-0x1.a013a2p-13f + z * 0x1.6dbbeep-19f);
-  s = r - ((half * y - y) - (z * r) * s);
-  c = (0x1.555554p-5f + z * -0x1.6c12cep-10f) + (z * z) * 0x1.9bd67p-16f;
+  s = (-0x1.555556p-3f + (z * 0x1.11110ep-7f)) +
+      ((z * z) * (-0x1.a013a2p-13f + (z * 0x1.6dbbeep-19f)));
+  s = r - (((half * y) - y) - ((z * r) * s));
+  c = (0x1.555554p-5f + (z * -0x1.6c12cep-10f)) + ((z * z) * 0x1.9bd67p-16f);
   one = 1.0f - half;
-  c = one + (((1.0f - one) - half) + ((z * z) * c - r * y));
-  *sine = slf_real(slf_bits((n & 1) != 0 ? c : s) ^ ((n << 30) & SLF_SIGN_BIT));
-  *cosine = slf_real(slf_bits((n & 1) != 0 ? s : c) ^ (((n + 1) << 30) & SLF_SIGN_BIT));
+  c = one + (((1.0f - one) - half) + (((z * z) * c) - (r * y)));
+  *sine = slf_real(slf_bits(((n & 1) != 0) ? c : s) ^ ((n << 30) & SLF_SIGN_BIT));
+  *cosine = slf_real(slf_bits(((n & 1) != 0) ? s : c) ^ (((n + 1) << 30) & SLF_SIGN_BIT));
 }
 
 static inline float slf_sin(float x) {
@@ -374,11 +378,11 @@ static inline float slf_tan(float x) {
  * y ~ x^(-1/3) from the bits of x divided by -3, one step of third order, then rounded to 8 bits so
  * that y^3 is exact: x^(-1/3) = y (1 + d) with d from h = 1 - x y^3. */
 static inline float slf_rcbrt_parts(float x, float *d) {
-  float y = slf_real(UINT32_C(0x54a2fa8c) - slf_bits(x) / 3), h = 1.0f - x * (y * y * y);
-  y = y + (y * h) * (0x1.555556p-2f + h * 0x1.c71c72p-3f);
+  float y = slf_real(UINT32_C(0x54a2fa8c) - (slf_bits(x) / 3)), h = 1.0f - (x * (y * y * y));
+  y = y + ((y * h) * (0x1.555556p-2f + (h * 0x1.c71c72p-3f)));
   y = slf_real((slf_bits(y) + UINT32_C(0x8000)) & UINT32_C(0xffff0000));
-  h = 1.0f - x * (y * y * y);
-  *d = h * ((0x1.555556p-2f + h * 0x1.c71c72p-3f) + (h * h) * 0x1.61f9aep-3f);
+  h = 1.0f - (x * (y * y * y));
+  *d = h * ((0x1.555556p-2f + (h * 0x1.c71c72p-3f)) + ((h * h) * 0x1.61f9aep-3f));
   return y;
 }
 
@@ -386,23 +390,23 @@ static inline float slf_rcbrt_parts(float x, float *d) {
  * products are exact, x cut to 8 or 16 bits for that, and the small rest is added last. */
 static inline float slf_m1_3_sum(float x) {
   float d, y = slf_rcbrt_parts(x, &d);
-  return y + y * d;
+  return y + (y * d);
 }
 
 static inline float slf_m2_3_sum(float x) {
   float d, y = slf_rcbrt_parts(x, &d), y2 = y * y;
-  return y2 + y2 * (d + d + d * d);
+  return y2 + (y2 * (d + d + (d * d)));
 }
 
 static inline float slf_p1_3_sum(float x) {
   float d, y = slf_rcbrt_parts(x, &d), y2 = y * y,
            xh = slf_real(slf_bits(x) & UINT32_C(0xffff0000));
-  return xh * y2 + ((x - xh) * y2 + (x * y2) * (d + d + d * d));
+  return (xh * y2) + (((x - xh) * y2) + ((x * y2) * (d + d + (d * d))));
 }
 
 static inline float slf_p2_3_sum(float x) {
   float d, y = slf_rcbrt_parts(x, &d), xh = slf_real(slf_bits(x) & UINT32_C(0xffffff00));
-  return xh * y + ((x - xh) * y + (x * y) * d);
+  return (xh * y) + (((x - xh) * y) + ((x * y) * d));
 }
 
 /* x^(thirds/3) of what the fast path leaves out: zeros, infinities, NaN, negative, very small and
@@ -410,10 +414,12 @@ static inline float slf_p2_3_sum(float x) {
 SLF_RARE float slf_thirds_rare(float x, int thirds) {
   float to, unit; /* x is multiplied by `to` = 2^(-+60), the result by unit^thirds */
   if (x != x) return x;
-  if (x == 0.0f || slf_fabs(x) == SLF_INF) return (x == 0.0f) == (thirds > 0) ? 0.0f : SLF_INF;
+  if ((x == 0.0f) || (slf_fabs(x) == SLF_INF)) {
+    return ((x == 0.0f) == (thirds > 0)) ? 0.0f : SLF_INF;
+  }
   if (x < 0.0f) return SLF_NAN;
-  to = x < 1.0f ? 0x1p60f : 0x1p-60f;
-  unit = x < 1.0f ? 0x1p-20f : 0x1p20f;
+  to = (x < 1.0f) ? 0x1p60f : 0x1p-60f;
+  unit = (x < 1.0f) ? 0x1p-20f : 0x1p20f;
   switch (thirds) {
     case 1: return slf_p1_3_sum(x * to) * unit;
     case 2: return slf_p2_3_sum(x * to) * (unit * unit);
@@ -438,9 +444,11 @@ static inline float slf_pow_m2_3(float x) {
 
 /* ---- pow ----------------------------------------------------------------------------------------
  * Exponents with a kernel of their own.  pow(-0, 1/2) = +0, pow(-inf, 1/2) = +inf, unlike sqrt. */
-static inline float slf_pow_p1_2(float x) { return x == -SLF_INF ? SLF_INF : slf_sqrt(x) + 0.0f; }
+static inline float slf_pow_p1_2(float x) {
+  return (x == -SLF_INF) ? SLF_INF : (slf_sqrt(x) + 0.0f);
+}
 static inline float slf_pow_m1_2(float x) { return 1.0f / slf_pow_p1_2(x); }
-static inline float slf_pow_p3_2(float x) { return x == -SLF_INF ? SLF_INF : x * slf_sqrt(x); }
+static inline float slf_pow_p3_2(float x) { return (x == -SLF_INF) ? SLF_INF : (x * slf_sqrt(x)); }
 static inline float slf_pow_p1(float x) { return x; }
 static inline float slf_pow_m1(float x) { return 1.0f / x; }
 static inline float slf_pow_p2(float x) { return x * x; }
@@ -457,17 +465,17 @@ static inline void slf_pow_log(float x, float y, int scaled, float *hi, float *l
   float k = slf_exponent(shifted, scaled), m = slf_real(b - (shifted & UINT32_C(0xff800000)));
   float c = short_c[quarter], f = m - c, u = m + c, v = 1.0f / u, s = f * v;
   float sh = slf_real(slf_bits(s) & SLF_HIGH_12), uh = slf_real(slf_bits(u) & SLF_HIGH_12);
-  float sl = ((f - sh * uh) - sh * (m - (uh - c))) * v;
+  float sl = ((f - (sh * uh)) - (sh * (m - (uh - c)))) * v;
   float ds = (sh - s) + sl; /* s + ds is the better s */
-  float z = s * s, p = 0x1.555556p-1f + z * (0x1.999956p-2f + z * 0x1.258bfap-2f);
+  float z = s * s, p = 0x1.555556p-1f + (z * (0x1.999956p-2f + (z * 0x1.258bfap-2f)));
   float kl = k * 0x1.62e4p-1f, t = kl + log_high[quarter], tl = (kl - t) + log_high[quarter];
   float sh2 = sh + sh, h = t + sh2;
-  float rest = (tl + (k * 0x1.7f7d1cp-20f + log_low[quarter])) + ((sl + sl) + (z + z) * ds);
-  float l = (((t - h) + sh2) + rest) + (s * z) * p;
+  float rest = (tl + ((k * 0x1.7f7d1cp-20f) + log_low[quarter])) + ((sl + sl) + ((z + z) * ds));
+  float l = (((t - h) + sh2) + rest) + ((s * z) * p);
   float lh = slf_real(slf_bits(h + l) & SLF_HIGH_12), ll = (h - lh) + l;
   float yh = slf_real(slf_bits(y) & SLF_HIGH_12);
   *hi = yh * lh;
-  *lo = y * ll + (y - yh) * lh;
+  *lo = (y * ll) + ((y - yh) * lh);
 }
 
 /* 0: not an integer, 1: odd, 2: even */
@@ -475,21 +483,23 @@ static inline int slf_parity(float y) {
   float a = slf_fabs(y), h = 0.5f * a;
   if (a >= 0x1p24f) return 2;
   if (slf_floor(a) != a) return 0;
-  return slf_floor(h) == h ? 2 : 1;
+  return (slf_floor(h) == h) ? 2 : 1;
 }
 
 /* C99 Annex F.9.4.4 in its order, then the general case with every scaling. */
 SLF_RARE float slf_pow_rare(float x, float y) {
   float a = slf_fabs(x), hi, lo, r;
   int parity, scaled = 0;
-  if (y == 0.0f || x == 1.0f) return 1.0f;
-  if (x != x || y != y) return x + y;
-  if (slf_fabs(y) == SLF_INF) return a == 1.0f ? 1.0f : (a > 1.0f) == (y > 0.0f) ? SLF_INF : 0.0f;
+  if ((y == 0.0f) || (x == 1.0f)) return 1.0f;
+  if ((x != x) || (y != y)) return x + y;
+  if (slf_fabs(y) == SLF_INF) {
+    return (a == 1.0f) ? 1.0f : ((a > 1.0f) == (y > 0.0f)) ? SLF_INF : 0.0f;
+  }
   parity = slf_parity(y);
-  if (a == 0.0f || a == SLF_INF) {
-    r = (a == 0.0f) == (y > 0.0f) ? 0.0f : SLF_INF;
+  if ((a == 0.0f) || (a == SLF_INF)) {
+    r = ((a == 0.0f) == (y > 0.0f)) ? 0.0f : SLF_INF;
   } else {
-    if (x < 0.0f && parity == 0) return SLF_NAN;
+    if ((x < 0.0f) && (parity == 0)) return SLF_NAN;
     if (a < FLT_MIN) {
       a *= 0x1p25f;
       scaled = 25;
@@ -497,7 +507,7 @@ SLF_RARE float slf_pow_rare(float x, float y) {
     slf_pow_log(a, y, scaled, &hi, &lo);
     r = slf_exp_sum_rare(hi, lo);
   }
-  return parity == 1 ? slf_copysign(r, x) : r;
+  return (parity == 1) ? slf_copysign(r, x) : r;
 }
 
 static inline float slf_pow_general(float x, float y) {

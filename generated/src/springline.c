@@ -27,7 +27,7 @@ enum { SPRINGLINE_READY = 0x5a17 }; /* springline_init has been here */
 
 const springline_config springline_default_config = {SPRINGLINE_FALLBACK_ZERO};
 
-const springline_real springline_base_nodes[SPRINGLINE_BASE_NODES] = {0.0, 0.5, 1.0};
+const springline_real springline_base_nodes[] = {0.0, 0.5, 1.0};
 
 static const springline_command springline_no_command = {0.0, 0.0};
 static const springline_diagnostics springline_no_diagnostics = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
@@ -37,7 +37,7 @@ static const springline_base springline_base_at_rest = {0.0, 0.0, 0.0, 0.0, 0.0,
 
 /* A compile-time error where a controller takes more than the 32 bytes that springline.h says. */
 typedef char springline_controller_has_its_size[
-    sizeof(springline_controller) <= 32u ? 1 : -1];
+    (sizeof(springline_controller) <= 32u) ? 1 : -1];
 
 static int springline_is_finite(springline_real x) { return sl_isfinite(x); }
 
@@ -240,10 +240,12 @@ static int springline_evaluate_control(
   diagnostics->sigma_rotation = sigma_rotation;
   diagnostics->saturated_lift = 0;
   diagnostics->saturated_rotation = 0;
-  diagnostics->a_limited_lift = dsigma_lift < -control_a_max_lift || dsigma_lift >
-      control_a_max_lift;
-  diagnostics->a_limited_rotation = dsigma_rotation < -control_a_max_rotation || dsigma_rotation >
-      control_a_max_rotation;
+  diagnostics->a_limited_lift =
+      (dsigma_lift < -control_a_max_lift) ||
+      (dsigma_lift > control_a_max_lift);
+  diagnostics->a_limited_rotation =
+      (dsigma_rotation < -control_a_max_rotation) ||
+      (dsigma_rotation > control_a_max_rotation);
   return
       springline_is_finite(dsigma_lift) &&
       springline_is_finite(dsigma_rotation);
@@ -490,8 +492,8 @@ static int springline_is_ready(const springline_controller *controller) {
 /* What is wrong with a configuration, before anything of it is taken. */
 static int springline_judge(const springline_config *config) {
   if (config == NULL) return SPRINGLINE_NULL_ARGUMENT;
-  if (config->fallback != SPRINGLINE_FALLBACK_ZERO &&
-      config->fallback != SPRINGLINE_FALLBACK_LAST) {
+  if ((config->fallback != SPRINGLINE_FALLBACK_ZERO) &&
+      (config->fallback != SPRINGLINE_FALLBACK_LAST)) {
     return SPRINGLINE_BAD_FALLBACK;
   }
   return SPRINGLINE_OK;
@@ -523,7 +525,9 @@ int springline_set_parameters(springline_controller *controller, const springlin
   if (controller == NULL) return SPRINGLINE_NULL_ARGUMENT;
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
   status = springline_judge(config);
-  if (status == SPRINGLINE_OK) springline_take(controller, config);
+  if (status == SPRINGLINE_OK) {
+    springline_take(controller, config);
+  }
   return status;
 }
 
@@ -543,7 +547,7 @@ int springline_step(
   springline_command wished = springline_no_command;
   springline_diagnostics seen = springline_no_diagnostics;
   int status = SPRINGLINE_OK;
-  if (controller == NULL || reference == NULL || measurement == NULL || command == NULL) {
+  if ((controller == NULL) || (reference == NULL) || (measurement == NULL) || (command == NULL)) {
     status = SPRINGLINE_NULL_ARGUMENT;
   } else if (!springline_is_ready(controller)) {
     status = SPRINGLINE_NOT_INITIALIZED;
@@ -561,13 +565,17 @@ int springline_step(
   if (status == SPRINGLINE_OK) {
     controller->last = wished;
   } else {
-    const int ready = controller != NULL && springline_is_ready(controller);
-    const int keeps = ready && controller->config.fallback == SPRINGLINE_FALLBACK_LAST;
+    const int ready = (controller != NULL) && springline_is_ready(controller);
+    const int keeps = ready && (controller->config.fallback == SPRINGLINE_FALLBACK_LAST);
     wished = keeps ? controller->last : springline_no_command;
     seen = springline_no_diagnostics;
   }
-  if (command != NULL) *command = wished;
-  if (diagnostics != NULL) *diagnostics = seen;
+  if (command != NULL) {
+    *command = wished;
+  }
+  if (diagnostics != NULL) {
+    *diagnostics = seen;
+  }
   return status;
 }
 
@@ -581,12 +589,14 @@ int springline_plant_step(
   springline_real x[8], at[8], next[8];
   springline_real slope[8];
   int i;
-  if (controller == NULL || state == NULL || command == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  if ((controller == NULL) || (state == NULL) || (command == NULL)) {
+    return SPRINGLINE_NULL_ARGUMENT;
+  }
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
-  if (!springline_is_finite(step) || step <= 0.0) return SPRINGLINE_BAD_PLANT_INPUT;
+  if (!springline_is_finite(step) || (step <= 0.0)) return SPRINGLINE_BAD_PLANT_INPUT;
   if (!springline_command_is_finite(command)) return SPRINGLINE_BAD_PLANT_INPUT;
   for (i = 0; i < SPRINGLINE_BASE_NODES; i++) {
-    motion[i] = base != NULL ? &base[i] : &springline_base_at_rest;
+    motion[i] = (base != NULL) ? &base[i] : &springline_base_at_rest;
     if (!springline_base_is_finite(motion[i])) return SPRINGLINE_BAD_PLANT_INPUT;
   }
   x[0] = state->q1_lift;
@@ -652,7 +662,7 @@ int springline_measure(
     const springline_controller *controller,
     springline_state *state,
     springline_measurement *measurement) {
-  if (controller == NULL || state == NULL || measurement == NULL) {
+  if ((controller == NULL) || (state == NULL) || (measurement == NULL)) {
     return SPRINGLINE_NULL_ARGUMENT;
   }
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
@@ -666,7 +676,7 @@ int springline_measure(
 }
 
 int springline_start(const springline_controller *controller, springline_state *state) {
-  if (controller == NULL || state == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  if ((controller == NULL) || (state == NULL)) return SPRINGLINE_NULL_ARGUMENT;
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
   const double initial_q_lift = 0.8;      /* m; initial joint coordinate (lift) */
   const double initial_q_rotation = 0.5;  /* rad; initial joint coordinate (rotation) */
@@ -688,7 +698,9 @@ int springline_signals(
     springline_real t,
     springline_reference *reference,
     springline_base *base) {
-  if (controller == NULL || reference == NULL || base == NULL) return SPRINGLINE_NULL_ARGUMENT;
+  if ((controller == NULL) || (reference == NULL) || (base == NULL)) {
+    return SPRINGLINE_NULL_ARGUMENT;
+  }
   if (!springline_is_ready(controller)) return SPRINGLINE_NOT_INITIALIZED;
   if (!springline_is_finite(t)) return SPRINGLINE_BAD_TIME;
   {

@@ -82,8 +82,8 @@ app.command("generate")(generate.generate)
 export.command("c")(generate.export_c)
 export.command("fmu2")(fmu.export_fmu2)
 export.command("fmu3")(fmu.export_fmu3)
-for name, description in targets().items():
-    export.command(name)(target.target_command(name, description))
+for name, found in targets().items():
+    export.command(name)(target.target_command(name, found))
 app.add_typer(export, name="export")
 app.command("reproduce")(reproduce.reproduce)
 for entry in sorted(entry_points(group="springline.commands"), key=lambda entry: entry.name):

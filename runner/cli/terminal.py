@@ -119,11 +119,16 @@ def _column_widths(
     return widths
 
 
-def print_json(command: str, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str], status: str = "ok") -> None:
-    """The one JSON object of a command on stdout; NaN becomes null, infinity "inf", for JSON has neither."""
+def print_json(
+    command: str, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str], status: str = "ok", **more: str
+) -> None:
+    """The one JSON object of a command on stdout, `more` after what every command has.
+
+    NaN becomes null, infinity "inf", for JSON has neither.
+    """
     from springline.runner.version import __version__
 
-    answer = {"command": command, "version": __version__, "status": status, "rows": rows, "units": units}
+    answer = {"command": command, "version": __version__, "status": status, "rows": rows, "units": units} | more
     text = json.dumps(_plain(answer), indent=2, ensure_ascii=False, allow_nan=False)
     sys.stdout.write("".join(json.dumps(c)[1:-1] if c != "\n" and printable(c) != c else c for c in text) + "\n")
 

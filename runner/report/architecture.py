@@ -7,7 +7,6 @@ files import counts for the rooms that import them. ``make docs-pictures`` draws
 
 from __future__ import annotations
 
-import argparse
 import ast
 import itertools
 import sys
@@ -21,7 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 
 from springline.codegen.files import canonical_json
-from springline.runner.report.style import figure_files, house_style
+from springline.runner.report.docs_picture import command, stamped
+from springline.runner.report.style import house_style
 
 ROOT = Path(__file__).parents[2]
 PICTURE = Path("docs/images/architecture.svg")
@@ -227,20 +227,9 @@ def shown(root: Path = ROOT) -> str:
 
 
 def drawn(root: Path = ROOT) -> bytes:
-    """The picture as SVG, with the hash of what it shows; the same sources and Matplotlib give the same bytes."""
-    image = figure_files("architecture", picture(root))["architecture.svg"]
-    return image.rstrip() + f"\n<!-- shown: {shown(root)} -->\n".encode()
-
-
-def main() -> int:
-    """Command line; the exit code is 2 where there is no docs/ to write to."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    if not PICTURE.parent.is_dir():
-        parser.error(f"there is no {PICTURE.parent}: run it in a checkout")
-    parser.parse_args()
-    PICTURE.write_bytes(drawn())
-    return 0
+    """The picture as SVG, with the hash of what it shows."""
+    return stamped(PICTURE, picture(root), shown(root))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command(PICTURE, drawn, __doc__))

@@ -5,7 +5,6 @@ Which way an arrow turns is asked of the model. ``make docs-pictures`` draws it 
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +20,8 @@ from numpy.typing import NDArray
 
 from springline.codegen.files import canonical_json
 from springline.model.base import COORDINATES, BaseCoordinate, turned
-from springline.runner.report.style import PAGE, figure_files, house_style
+from springline.runner.report.docs_picture import command, stamped
+from springline.runner.report.style import PAGE, house_style
 
 PICTURE = Path("docs/images/conventions.svg")
 
@@ -162,19 +162,8 @@ def shown() -> str:
 
 def drawn() -> bytes:
     """The picture as SVG, with the hash of what it says."""
-    image = figure_files("conventions", picture())["conventions.svg"]
-    return image.rstrip() + f"\n<!-- shown: {shown()} -->\n".encode()
-
-
-def main() -> int:
-    """Command line; the exit code is 2 where there is no docs/ to write to."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    if not PICTURE.parent.is_dir():
-        parser.error(f"there is no {PICTURE.parent}: run it in a checkout")
-    parser.parse_args()
-    PICTURE.write_bytes(drawn())
-    return 0
+    return stamped(PICTURE, picture(), shown())
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command(PICTURE, drawn, __doc__))

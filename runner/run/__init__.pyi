@@ -13,3 +13,4 @@ from .settings import loop_settings as loop_settings
 from .simulation import Progress as Progress
 from .simulation import Result as Result
 from .simulation import simulate as simulate
+from .trajectory_hash import trajectory_hash as trajectory_hash

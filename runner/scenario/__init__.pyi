@@ -2,12 +2,11 @@ from .checking import resolve as resolve
 from .dotted import canonical_key as canonical_key
 from .dotted import expect_keys as expect_keys
 from .locate import expect_kind as expect_kind
-from .locate import file_text as file_text
 from .locate import packaged_scenarios as packaged_scenarios
 from .locate import packaged_sweeps as packaged_sweeps
-from .locate import reason as reason
+from .locate import read_sweep as read_sweep
 from .locate import scenarios_folder as scenarios_folder
-from .scenario import NumericKey as NumericKey
+from .numeric_keys import NumericKey as NumericKey
 from .scenario import Scenario as Scenario
 from .scenario import Slots as Slots
 from .scenario import absent_at_zero as absent_at_zero

@@ -141,6 +141,26 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
         raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({reason(error)})")) from error
 
 
+def read_sweep(source: str | Path) -> tuple[str, Path]:
+    """Text of a sweep (a file, or a packaged one by name), and the folder that its scenario's path refers to.
+
+    Raises InputError if there is none.
+    """
+    name = str(source)
+    if not isinstance(source, Path) and name in packaged_sweeps():
+        folder = scenarios_folder() / "sweeps"
+        return (folder / f"{name}.toml").read_text("utf-8"), Path(str(folder))
+    expect_kind("sweep", source)
+    path = Path(source)
+    try:
+        return file_text(path), Path(os.path.realpath(path)).parent
+    except (FileNotFoundError, NotADirectoryError) as error:
+        there = sorted(str(path.parent / item.name) for item in path.parent.glob("*.toml"))
+        raise InputError(unknown(name, "", "file or packaged sweep", name, [*packaged_sweeps(), *there])) from error
+    except (OSError, ValueError) as error:  # no UTF-8, and names that no file can have
+        raise InputError(Problem(name, "", f"cannot be read as a text file in UTF-8 ({reason(error)})")) from error
+
+
 def file_text(path: Path) -> str:
     """Text of a scenario's or a sweep's file. Raises OSError and ValueError for what cannot be one."""
     return _contents(path, _LARGEST_SCENARIO).decode("utf-8-sig")

@@ -22,7 +22,6 @@ from springline.model.base_motion import MOTIONS, moving_terms
 from springline.model.control import CONTROLLERS, LAWS, LogForm, SurfaceExponents
 from springline.model.drive import DRIVES, FRICTION, DriveKind
 from springline.model.mechanisms import MECHANISMS
-from springline.model.parameters import POSITIVE, Bounds
 from springline.model.structure import MotorStart, SignalKind, SignalShape, Structure
 from springline.model.system import System, system_of
 from springline.runner.files import InputError, Problem, document_text, read_toml, shortened, unknown
@@ -32,7 +31,6 @@ from springline.runner.scenario.dotted import (
     canonical_key,
     expect_keys,
     flat,
-    other_spellings,
     plain,
     replaced,
     respelled,
@@ -40,6 +38,7 @@ from springline.runner.scenario.dotted import (
     scale_key,
 )
 from springline.runner.scenario.locate import expect_kind, read_scenario, relative_path
+from springline.runner.scenario.numeric_keys import NumericKey, first_outside, numeric_keys
 from springline.runner.scenario.splines import Spline
 from springline.runner.scenario.user_code import UserClass, canonical_reference, load_class, read_class, told
 
@@ -49,19 +48,6 @@ _SINGULAR = 1e-12
 
 Slots = dict[str, float | Floats]
 """Slot key -> one number for all runs, or a column (runs,) of them."""
-
-
-@dataclass(frozen=True, slots=True)
-class NumericKey:
-    """A number that may differ from run to run within one structure.
-
-    leaves  the entries of the scenario that it sets: itself, or one for each joint
-    """
-
-    unit: str
-    bounds: Bounds
-    meaning: str
-    leaves: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,12 +217,8 @@ class Scenario:
         return entries[name]
 
     def numeric_keys(self) -> dict[str, NumericKey]:
-        """Every number that may vary within the structure, by dotted key.
-
-        "mechanism.m3" moves the controller's value, and the plant's unless the plant has its own; "plant.m3" and
-        "plant.m3.scale" move the plant's alone; "control.mu" moves all joints, "control.mu.0" one.
-        """
-        return dict(_numeric_keys(self.structure()))
+        """Every number that may vary within the structure, by dotted key."""
+        return dict(numeric_keys(self.system()))
 
     def values_for(self, columns: Mapping[str, ArrayLike]) -> Floats:
         """One parameter vector a run, (runs, slots), with `columns` as for `slots_for`; one run if there are none."""
@@ -249,7 +231,7 @@ class Scenario:
         Raises InputError for an unknown key, what is no column of numbers, a number that would not stay what it is, and
         one that is out of bounds.
         """
-        keys, problems = _numeric_keys(self.structure()), []
+        keys, problems = numeric_keys(self.system()), []
         result = {}
         for name, values in columns.items():
             if name not in keys:
@@ -264,7 +246,7 @@ class Scenario:
                 text = "expected a column of numbers, one for each run"
                 problems.append(Problem(self.source, name, text, f"shape {column.shape}"))
                 continue
-            outside = _first_outside(keys[name].bounds, column)
+            outside = first_outside(keys[name].bounds, column)
             if outside is not None:
                 text = f"run {outside}: expected {schema.number_text(keys[name].bounds, keys[name].unit)}"
                 problems.append(Problem(self.source, name, text, schema.given_text(float(column[outside]))))
@@ -278,7 +260,7 @@ class Scenario:
 
         Where two keys set the same entry, the later one counts. Raises InputError.
         """
-        keys = _numeric_keys(self.structure())
+        keys = numeric_keys(self.system())
         numbers: dict[str, float | Floats] = dict(self._numbers)
         checked = self.columns_for(columns)
         runs = len(next(iter(checked.values()), ()))
@@ -569,39 +551,6 @@ def per_run(slots: Slots, keys: Sequence[str], runs: int) -> Floats:
     return result
 
 
-@lru_cache(maxsize=64)
-def _numeric_keys(structure: Structure) -> dict[str, NumericKey]:
-    """The numeric keys of a structure; who asks for every chunk of a sweep gets the same."""
-    system, keys = system_of(structure), {}
-    groups: dict[str, list[str]] = {}
-    for slot in system.slots:
-        if slot.key.startswith("initial.") and _is_idle(slot.key, structure):
-            continue
-        unit = schema.unit_text(slot.unit, system.joints)
-        for key in (slot.key, *other_spellings(slot.key)):
-            keys[key] = NumericKey(unit, slot.bounds, slot.meaning, (slot.key,))
-        if slot.key.startswith("plant."):
-            scale = scale_key(slot.key)
-            keys[scale] = NumericKey("1", POSITIVE, f"{slot.meaning}, as a factor on the controller's", (scale,))
-    for key in keys:
-        stem, _, last = key.rpartition(".")
-        if last.isdigit() and not stem.startswith("base_motion."):
-            groups.setdefault(stem, []).append(key)
-    for stem, leaves in groups.items():
-        units = " or ".join(dict.fromkeys(keys[leaf].unit for leaf in leaves))
-        first = keys[leaves[0]]
-        meaning = first.meaning.rpartition(" (")[0]
-        keys[stem] = NumericKey(units, first.bounds, f"{meaning} (all joints)", tuple(leaves))
-    return keys
-
-
-def _is_idle(key: str, structure: Structure) -> bool:
-    """Whether an initial value is not read, for the structure says how the run starts."""
-    if structure.start == "reference":
-        return True
-    return key.startswith("initial.q_motor.") and structure.initial_motor != "given"
-
-
 def _with_paths(document: Document, moved: Callable[[str], str], named: Callable[[str], str]) -> Document:
     """A document whose signal tables name other paths, and whose doors other classes."""
     result = {
@@ -656,13 +605,3 @@ def absent_at_zero(key: str) -> bool:
     table, _, rest = key.partition(".")
     name, _, place = rest.partition(".")
     return table in ("drive", "plant") and name in {item.name for item in FRICTION} and (not place or place.isdecimal())
-
-
-def _first_outside(bounds: Bounds, column: Floats) -> int | None:
-    """Index of the first value that is out of bounds; bounds are an interval, so the extremes tell for all."""
-    if column.size == 0:
-        return None
-    inside = not np.isnan(column).any() and bounds.holds(float(column.min())) and bounds.holds(float(column.max()))
-    if inside and not (bounds.even and np.any(column % 2)):
-        return None
-    return next(i for i, value in enumerate(column) if not bounds.holds(float(value)))

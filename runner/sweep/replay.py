@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,8 @@ from springline.runner.scenario import FOLDER as TABLES
 from springline.runner.sweep import sampling
 from springline.runner.sweep.dataset import Dataset
 from springline.runner.sweep.plan import Plan
-from springline.runner.sweep.sweep import Axis, sweep_from_json
+from springline.runner.sweep.sweep import Axis
+from springline.runner.sweep.sweep_file import sweep_from_json
 
 
 def stored_plan(dataset: Dataset, code: Sequence[Path] = ()) -> Plan:
@@ -123,29 +124,45 @@ def _found(axis: Axis, kept: dict[str, str]) -> Axis:
     return axis
 
 
-def replayed(plan: Plan, run: int) -> Scenario:
-    """The scenario of one run. Raises InputError if there is no such run."""
+@dataclass(frozen=True)
+class RecordedRun:
+    """A run as its dataset has it.
+
+    row   of the dataset;  flaw  what is wrong with the part that holds it, "" if nothing is
+    """
+
+    scenario: Scenario
+    row: dict[str, Any]
+    flaw: str
+
+    def files(self, folder: Path) -> dict[str, bytes]:
+        """scenario.toml for `folder`, and the CSV files that it reads beside it; users' classes stay where they are."""
+        read = {record.section: record.content for record in records(self.scenario)}
+        paths = {section: f"{TABLES}/{section}.csv" for section in read}
+        tables = {paths[section]: content for section, content in read.items()}
+        names = {user.reference: user.reference_from(folder) for user in self.scenario.code}
+        return {"scenario.toml": portable_text(self.scenario, paths, names).encode(), **tables}
+
+    def differences(self, metrics: pa.Table) -> list[str]:
+        """Where the metrics of a run are not those of the dataset's row, bit for bit; a line each."""
+        again = metrics.to_pylist()[0]
+        return [
+            f"{name}: {_exact(self.row.get(name))} in the dataset, {_exact(value)} now"
+            for name, value in again.items()
+            if _exact(self.row.get(name)) != _exact(value)
+        ]
+
+
+def recorded_run(dataset: Dataset, plan: Plan, run: int) -> RecordedRun:
+    """One run of a dataset.
+
+    Raises InputError if there is no such run, the dataset does not have it (yet), or its part cannot be read.
+    """
     try:
-        return plan.scenario_of(run)
+        scenario = plan.scenario_of(run)
     except IndexError:
         text = f"expected the number of a run, 0 to {plan.runs - 1}"
         raise InputError(Problem(plan.sweep.source, "", text, str(run))) from None
-
-
-def files_of(scenario: Scenario, folder: Path) -> dict[str, bytes]:
-    """scenario.toml for `folder`, and the CSV files that it reads beside it; users' classes stay where they are."""
-    read = {record.section: record.content for record in records(scenario)}
-    paths = {section: f"{TABLES}/{section}.csv" for section in read}
-    tables = {paths[section]: content for section, content in read.items()}
-    names = {user.reference: user.reference_from(folder) for user in scenario.code}
-    return {"scenario.toml": portable_text(scenario, paths, names).encode(), **tables}
-
-
-def recorded(dataset: Dataset, plan: Plan, run: int) -> tuple[dict[str, Any], str]:
-    """The row of one run, and what is wrong with the part that holds it, "" if nothing is.
-
-    Raises InputError if the dataset does not have it (yet), or the part cannot be read.
-    """
     chunk = plan.chunk_of(run)
     name = f"{dataset.place.name}/{dataset.part_name(chunk.number)}"
     try:
@@ -157,17 +174,7 @@ def recorded(dataset: Dataset, plan: Plan, run: int) -> tuple[dict[str, Any], st
     if part.table is None:
         raise InputError(Problem(name, "", f"{part.flaw}: {again}"))
     row: dict[str, Any] = part.table.slice(run - chunk.first, 1).to_pylist()[0]
-    return row, f"{name} {part.flaw}: {again}" if part.flaw else ""
-
-
-def differences(row: dict[str, Any], metrics: pa.Table) -> list[str]:
-    """Where the metrics of a run are not those of the dataset's row, bit for bit; a line each."""
-    again = metrics.to_pylist()[0]
-    return [
-        f"{name}: {_exact(row.get(name))} in the dataset, {_exact(value)} now"
-        for name, value in again.items()
-        if _exact(row.get(name)) != _exact(value)
-    ]
+    return RecordedRun(scenario, row, f"{name} {part.flaw}: {again}" if part.flaw else "")
 
 
 def _exact(value: object) -> str:

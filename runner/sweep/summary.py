@@ -1,4 +1,4 @@
-"""What a dataset says: shares of what became of the runs, quantiles of each metric, the worst runs, and figures.
+"""What a dataset says: shares of what became of the runs, quantiles of each metric, the worst runs.
 
 Tables of a million rows are read one column, or one part, at a time, so that memory stays flat.
 """
@@ -16,10 +16,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import compute
 
-from springline.codegen.files import render
-from springline.codegen.kernel import CHATTERING, METRICS, STATUS, chatters
+from springline.codegen.kernel import METRICS, STATUS, chatters
 from springline.model.parameters import Joint
-from springline.runner.files import units, value_text
+from springline.runner.files import units
 from springline.runner.sweep import sampling
 from springline.runner.sweep.dataset import Dataset
 from springline.runner.sweep.plan import Chunk, Plan
@@ -30,8 +29,8 @@ Floats = NDArray[np.float64]
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 WORST = 10
 
-_OUTCOMES = tuple(status for status in STATUS if status != "stopped")
-_CHATTERING = "chattering"
+OUTCOMES = tuple(status for status in STATUS if status != "stopped")
+CHATTERED = "chattering"
 _SHOWN = 20_000  # rows that figures are drawn from
 
 
@@ -64,7 +63,7 @@ class Summary:
     @property
     def stopped(self) -> int:
         """Runs that diverged or left their bounds or limits."""
-        return sum(group[status] for group in self.outcomes.values() for status in _OUTCOMES if status != "ok")
+        return sum(group[status] for group in self.outcomes.values() for status in OUTCOMES if status != "ok")
 
 
 def summarize(plan: Plan, dataset: Dataset, done: Collection[int] | None = None) -> Summary:
@@ -79,16 +78,16 @@ def summarize(plan: Plan, dataset: Dataset, done: Collection[int] | None = None)
     parts = [dataset.part_name(chunk.number) for chunk in chunks]
     names = group_names(plan)
     joints = plan.joints
-    outcomes = {name: dict.fromkeys((*_OUTCOMES, _CHATTERING), 0) for name in names}
+    outcomes = {name: dict.fromkeys((*OUTCOMES, CHATTERED), 0) for name in names}
     # Gathered as arrays of their final length: small tables would be many, and each a hole in the memory.
     rows = sum(np.count_nonzero(_picked(chunk, runs)) for chunk in chunks)
     gathered = {field.name: np.empty(rows, field.type.to_pandas_dtype()) for field in plan.schema}
     row = 0
     for chunk, part in zip(chunks, parts, strict=True):
         table = dataset.read_part(part)
-        for outcome in _OUTCOMES:
+        for outcome in OUTCOMES:
             outcomes[names[chunk.group.number]][outcome] += int(np.count_nonzero(_ended(table, outcome)))
-        outcomes[names[chunk.group.number]][_CHATTERING] += int(np.count_nonzero(chattering(table, joints)))
+        outcomes[names[chunk.group.number]][CHATTERED] += int(np.count_nonzero(chattering(table, joints)))
         picked = table.filter(pa.array(_picked(chunk, runs)))
         for name, column in gathered.items():
             column[row : row + len(picked)] = picked[name].to_numpy()
@@ -170,93 +169,14 @@ def group_names(plan: Plan) -> list[str]:
         return ["all"]
     tied = {axis.key for axis in plan.sweep.axes if axis.kind == "tie"}
     constants = ({key: value for key, value in group.constants.items() if key not in tied} for group in plan.groups)
-    return [", ".join(f"{key.rpartition('.')[2]} = {_short(value)}" for key, value in c.items()) for c in constants]
+    return [", ".join(f"{key.rpartition('.')[2]} = {short(value)}" for key, value in c.items()) for c in constants]
 
 
-def _short(value: object) -> str:
+def short(value: object) -> str:
+    """A value as a few characters for people."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
         return f"{value:g}"
     text = str(value)
     return text if len(text) <= 30 else f"{text[:29]}…"
-
-
-# --- tables ----------------------------------------------------------------------------------------------
-
-Rows = tuple[list[str], list[list[str]]]
-"""Header and rows of a table of texts."""
-
-
-def summary_tables(summary: Summary, keys: Sequence[str]) -> tuple[Rows, Rows, Rows]:
-    """How the runs of each group ended; quantiles of the metrics; the worst runs with these keys."""
-    return _outcome_rows(summary), _metric_rows(summary), _worst_rows(summary, keys)
-
-
-def _outcome_rows(summary: Summary) -> Rows:
-    """How many runs of each group ended how."""
-    header = [
-        "group",
-        "runs",
-        "ok",
-        "of these chattering",
-        "diverged",
-        "out of bounds",
-        "out of limits",
-        "stopped early",
-    ]
-    rows = []
-    for name, counts in summary.outcomes.items():
-        total = sum(counts[outcome] for outcome in _OUTCOMES)
-        share = (total - counts["ok"]) / total if total else 0.0
-        shown = ("ok", _CHATTERING, *_OUTCOMES[1:])
-        rows.append([name, str(total), *(str(counts[outcome]) for outcome in shown), f"{share:.2%}"])
-    return header, rows
-
-
-def _metric_rows(summary: Summary) -> Rows:
-    """Quantiles of every metric, over the runs that have it."""
-    names = {0.0: "least", 0.5: "median", 1.0: "largest"}
-    header = ["metric", "unit", *(names.get(q, f"{q:.0%}") for q in QUANTILES), "none"]
-    rows = [
-        [
-            column,
-            summary.units[column],
-            *("–" if np.isnan(value) else f"{value:.4g}" for value in item.quantiles),
-            f"{item.missing:.2%}",
-        ]
-        for column, item in summary.metrics.items()
-    ]
-    return header, rows
-
-
-def _worst_rows(summary: Summary, keys: Sequence[str]) -> Rows:
-    """The worst runs with what varied and what came of it."""
-    results = [name for name in summary.units if name.startswith(("settling_time_", "steady_state_error_"))]
-    header = ["run", "status", "t_end", *keys, *results]
-    return header, [[_cell(row[name]) for name in header] for row in summary.worst]
-
-
-def _cell(value: object) -> str:
-    if value is None:
-        return "–"
-    return f"{value:.6g}" if isinstance(value, float) else _short(value)
-
-
-def markdown(plan: Plan, summary: Summary, figures: Sequence[str], name: str) -> str:
-    """summary.md: the tables, and the figures by file name."""
-    axes = plan.sweep.axes
-    outcomes, metrics, worst = summary_tables(summary, [axis.key for axis in axes])
-    return render(
-        "springline.runner.sweep",
-        "summary.md.j2",
-        name=name,
-        plan=plan,
-        runs=summary.runs,
-        varied=[(axis.key, value_text(axis.as_toml())) for axis in axes],
-        outcomes=outcomes,
-        chattering=f"{CHATTERING:g}",
-        figures=figures,
-        metrics=metrics,
-        worst=worst,
-    )

@@ -9,18 +9,19 @@ from typing import Any
 import jinja2
 import pytest
 
-from springline.codegen.export import bind
+from springline.codegen.export import LONGEST as LONGEST_NAME
+from springline.codegen.export import LONGEST_LINKED, bind, check_linked
 from springline.codegen.export.c.interface import TypedInterface
 from springline.codegen.export.c.texts import text_files
 from springline.codegen.export.fmu.settings import FmiVersion, Settings
 from springline.codegen.export.fmu.source import sources
 from springline.codegen.export.fmu.variables import PARTS, Part, interface, part_parameters
-from springline.codegen.export.names import check_prefix
 from springline.codegen.files.templates import LINE, aligned, comment, fitted, quoted, render, wrap
 from springline.runner import load_scenario
 from springline.runner.scenario import kernel_tables
 
-LONGEST = "manipulator_on_a_ship_number_7"
+LONGEST = "w" * LONGEST_LINKED
+LONGEST_FMU = "w" * LONGEST_NAME
 INTEGRAL = """
 from springline.model import Control, Controller, Parameter, Quantity
 
@@ -62,8 +63,7 @@ def exported(prefix: str, case: str, folder: Path) -> dict[str, str]:
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("prefix", ["a", "springline", LONGEST])
 def test_no_line_of_generated_c_is_too_long(prefix: str, case: str, tmp_path: Path) -> None:
-    assert len(LONGEST) == 30
-    check_prefix(prefix)
+    check_linked(prefix)
     files = exported(prefix, case, tmp_path)
     assert ("src/" + prefix + "_tables.h" in files) == (case == "tables")
     assert ("_initial_memory" in files[f"src/{prefix}.c"]) == ("memory" in case)
@@ -80,7 +80,7 @@ def test_no_line_of_generated_c_is_too_long(prefix: str, case: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("part", PARTS)
-@pytest.mark.parametrize("prefix", ["springline", LONGEST])
+@pytest.mark.parametrize("prefix", ["springline", LONGEST_FMU])
 def test_no_line_of_an_fmus_c_is_too_long(prefix: str, part: Part) -> None:
     scenario = load_scenario("paper/nominal")
     system = scenario.system()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 import subprocess
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -18,6 +17,7 @@ from chains import chain, numbers_for
 from fmi_client import Client, client_library
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from printed import with_whole_comments
 
 from springline.codegen.export import bind
 from springline.codegen.export.c import generate_files
@@ -230,7 +230,7 @@ def test_exported_c_of_a_ship_has_what_moves_and_checks_itself(tmp_path: Path) -
     folder = tmp_path / "c"
     tunable = ["base_motion"]
     write_tree(folder, *generate_files(bind(structure, values_of(structure), tunable=tunable)))
-    header = re.sub(r"\n {20,}", " ", (folder / "include" / "springline.h").read_text())  # comments in one line
+    header = with_whole_comments((folder / "include" / "springline.h").read_text())
     for member, told in (
         ("dd_yaw;", "rad/s^2; acceleration of the base: yaw, bow to port"),
         ("mount_z;", "m; where the arm stands on the base: z, to starboard"),

@@ -223,12 +223,12 @@ class TypedInterface:
         if not bounds.infinite:
             yield f"{self.export.prefix}_is_finite({value})"
         if not math.isinf(bounds.low):
-            yield f"{value} {'>' if bounds.low_open else '>='} {literal(bounds.low, real)}"
+            yield f"({value} {'>' if bounds.low_open else '>='} {literal(bounds.low, real)})"
         if not math.isinf(bounds.high):
-            yield f"{value} {'<' if bounds.high_open else '<='} {literal(bounds.high, real)}"
+            yield f"({value} {'<' if bounds.high_open else '<='} {literal(bounds.high, real)})"
         if bounds.even:
             half = f"{literal(0.5, real)} * {value}"
-            yield f"{'slf' if real == 'float' else 'sl'}_floor({half}) >= {half}"
+            yield f"({'slf' if real == 'float' else 'sl'}_floor({half}) >= ({half}))"
 
 
 def _padded(size: int, alignment: int) -> int:

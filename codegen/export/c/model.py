@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib import resources
 
 from springline.codegen.export import Export, Port, ScalarPrinter, comment, operations, provenance
 from springline.codegen.export.c.baking import print_baked
+from springline.codegen.files import LINE, broken
 
-_LINE = 100
-"""Longest line of the files, in characters."""
-
-_BREAKS = ("{ ", ", ", "(", " ", ",")  # behind which of these a line is broken, the first that there is
+_BREAKS = (("{ ",), (", ",), ("(",), (" ",), (",",))  # CasADi's lines are long: between arguments if possible
 
 _CONVENTION = """
 Calling convention (CasADi's): arg[i] points to the entries of input i, res[i] to where output i
@@ -55,33 +53,9 @@ def model_files(export: Export) -> dict[str, bytes]:
         source, declarations = _print_single(export, stem)
     banner = comment([*start, "", *function_table(export)])
     return {
-        f"src/{stem}.c": _fitted(banner + "\n" + _FIVE_ARGUMENTS + source + _END).encode(),
-        f"src/{stem}.h": _fitted(banner + "\n" + _header(stem, declarations)).encode(),
+        f"src/{stem}.c": broken(banner + "\n" + _FIVE_ARGUMENTS + source + _END, _BREAKS).encode(),
+        f"src/{stem}.h": broken(banner + "\n" + _header(stem, declarations), _BREAKS).encode(),
     }
-
-
-def _fitted(text: str) -> str:
-    """C with the lines that are too long broken: a comment behind a statement in its column, all else at a space."""
-    return "".join(f"{part}\n" for line in text.splitlines() for part in _parts(line))
-
-
-def _parts(line: str) -> Iterator[str]:
-    commented = re.fullmatch(r"(.*; +)/\* (.*) \*/", line)
-    if commented and len(line) > _LINE:
-        column = len(commented[1])
-        words = textwrap.wrap(commented[2], _LINE - column - len("/*  */"), break_long_words=False)
-        for k, part in enumerate(words):
-            start = f"{commented[1]}/* " if k == 0 else " " * (column + 3)
-            yield f"{start}{part}{' */' if k == len(words) - 1 else ''}"
-        return
-    indent = len(line) - len(line.lstrip()) + 4
-    while len(line) > _LINE:
-        places = [k for k in range(indent + 1, _LINE + 2) if len(line[:k].rstrip()) <= _LINE]
-        ends = ([k for k in places if line.endswith(sign, indent, k)] for sign in _BREAKS)
-        place = max(next(filter(None, ends)))
-        yield line[:place].rstrip()
-        line = " " * indent + line[place:].lstrip()
-    yield line
 
 
 def _self_contained(source: str) -> str:
@@ -146,7 +120,7 @@ def _row(start: str, port: Port) -> list[str]:
 
 def _wrapped(start: str, entries: Sequence[str]) -> list[str]:
     text = start + ", ".join(entries)
-    return textwrap.wrap(text, _LINE - len(" * "), subsequent_indent="           ", break_long_words=False)
+    return textwrap.wrap(text, LINE - len(" * "), subsequent_indent="           ", break_long_words=False)
 
 
 def _header(stem: str, declarations: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ from importlib import resources
 from importlib.metadata import version
 from typing import Any
 
-from springline.codegen.export import Export, Port, operations
+from springline.codegen.export import Export, Port, check_linked, made_with, operations
 from springline.codegen.export.c.interface import TypedInterface
 from springline.codegen.export.c.model import model_files
 from springline.codegen.export.c.texts import text_files
@@ -17,9 +17,11 @@ def generate_files(export: Export) -> tuple[dict[str, bytes], dict[str, Any]]:
     """The files of an export by relative path, and its manifest (to which codegen.manifest adds the list of files).
 
     The same export gives the same bytes in every process and folder.
-    Raises ToolchainError without a C compiler, which the expected outputs of test_vectors.txt need; ValueError for
-    numbers that export.real cannot hold, and Overflow, which is one, for those that the model cannot compute with.
+    Raises ToolchainError without a C compiler, which the expected outputs of test_vectors.txt need; ValueError for a
+    prefix that is too long for a linker and for numbers that export.real cannot hold, and Overflow, which is one, for
+    those that the model cannot compute with.
     """
+    check_linked(export.prefix)
     runtime = resources.files("springline.codegen") / "runtime"
     headers = ("sl_mathf.h",) if export.real == "float" else ("sl_math.h", "sl_casadi.h")
     model = {**model_files(export), **{f"src/{name}": (runtime / name).read_bytes() for name in headers}}
@@ -43,6 +45,7 @@ def manifest(export: Export) -> dict[str, Any]:
         "springline": version("springline"),
         "casadi": version("casadi"),
         "hash": export.sha256,
+        "options": made_with(export),
         "parameters": [
             {
                 "name": slot.key,

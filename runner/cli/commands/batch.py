@@ -17,7 +17,7 @@ from springline.runner.cli.options import Changes, NoCode, overrides
 from springline.runner.cli.terminal import complain, console, print_json, print_table, say
 
 if TYPE_CHECKING:
-    from springline.runner.sweep import Dataset, Estimate, Plan, Pool, Report, Summary, Tally
+    from springline.runner.sweep import Dataset, Estimate, Plan, Pool, Report, Tally
 
 _LONG = 3600.0
 _LARGE = 10e9
@@ -151,7 +151,7 @@ def _finish(
     plan: Plan, dataset: Dataset, done: set[int], tally: Tally, again: str, *, plot: bool, as_json: bool
 ) -> None:
     """Summary and last words; exits with 1 if something failed."""
-    from springline.runner.sweep import summarize, summary_tables
+    from springline.runner.sweep import summarize, summary_tables, write_summary
 
     problems = [f"failed: {failure}" for failure in tally.failures]
     if tally.found + tally.done:
@@ -175,28 +175,6 @@ def _finish(
         raise typer.Exit(1)
     if not as_json:
         say(f"results: {dataset.place.name}")
-
-
-def write_summary(plan: Plan, dataset: Dataset, summary: Summary, *, plot: bool = True) -> None:
-    """summary.md and its figures beside the parts."""
-    from springline.runner.sweep import markdown
-
-    names = _write_figures(plan, dataset, summary) if plot else []
-    title = Path(plan.sweep.source).stem
-    dataset.place.write("summary.md", markdown(plan, summary, names, title).encode())
-
-
-def _write_figures(plan: Plan, dataset: Dataset, summary: Summary) -> list[str]:
-    """The figures of a dataset; their names in summary.md."""
-    from springline.runner.report import figure_files
-    from springline.runner.sweep import summary_figures
-
-    names = []
-    for name, figure in summary_figures(plan, summary).items():
-        for file, content in figure_files(name, figure).items():
-            dataset.place.write(file, content)
-        names.append(f"{name}.png")
-    return names
 
 
 class Heartbeat:
@@ -317,30 +295,28 @@ def replay(
     from springline.runner.report import figure_files
     from springline.runner.run import run_figures, simulate
     from springline.runner.scenario import expect_kind
-    from springline.runner.sweep import Dataset, differences, files_of, place, recorded, replayed, stored_plan
+    from springline.runner.sweep import Dataset, place, recorded_run, stored_plan
 
     expect_kind("dataset", dataset)
     source = Dataset(place(dataset))
     folder = output or Path("results", f"{Path(dataset).name}-{run}")
     refuse_occupied(folder, force=force)
-    plan = stored_plan(source, code or ())
-    scenario = replayed(plan, run)
-    row, flaw = recorded(source, plan, run)
-    if flaw:
-        complain(flaw)
-    result = simulate(scenario)
-    files = files_of(scenario, folder)
+    recorded = recorded_run(source, stored_plan(source, code or ()), run)
+    if recorded.flaw:
+        complain(recorded.flaw)
+    result = simulate(recorded.scenario)
+    files = recorded.files(folder)
     if plot:
-        for name, figure in run_figures(scenario, result).items():
+        for name, figure in run_figures(recorded.scenario, result).items():
             files |= figure_files(f"figures/{name}", figure)
     files |= table_files("trajectory", result.trajectory)
     files |= table_files("metrics", result.metrics)
     write_folder(folder, files, replaces=OUTPUTS)
-    wrong = differences(row, result.metrics)
+    wrong = recorded.differences(result.metrics)
     if as_json:
         print_json("replay", result.metrics.to_pylist(), units(result.metrics), result.status)
     else:
-        print_metrics(result, scenario.system().joints)
+        print_metrics(result, recorded.scenario.system().joints)
         say(result.message)
         say(f"results: {folder}")
     if wrong:

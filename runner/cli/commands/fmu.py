@@ -71,6 +71,7 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         force: Force = False,
         as_json: AsJson = False,
     ) -> None:
+        from springline.codegen.export import LONGEST
         from springline.codegen.export.fmu import fmu
         from springline.runner.scenario import kernel_tables, load_scenario
 
@@ -80,7 +81,8 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         loaded = load_scenario(scenario, overrides(changes, scenario))
         stem = re.sub(r"\W", "_", Path(scenario).stem, flags=re.ASCII)
         begin = stem if stem[:1].isalpha() else f"scenario_{stem}"
-        identifier = name or re.sub("_+", "_", f"{begin}_{part}_fmi{version}")
+        end = f"_{part}_fmi{version}"
+        identifier = name or re.sub("_+", "_", begin[: LONGEST - len(end)] + end)
         try:
             content = fmu(
                 loaded.structure(),

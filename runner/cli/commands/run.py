@@ -55,6 +55,10 @@ def run(
     no_code: NoCode = False,
     engine: Annotated[Engine, typer.Option(help="The engine.")] = Engine.lanes,
     form: Annotated[Format, typer.Option("--format", help="Format of the tables.")] = Format.parquet,
+    with_hash: Annotated[
+        bool,
+        typer.Option("--hash", help="Print a SHA-256 of the trajectory's bits last: equal bits, equal hash."),
+    ] = False,
     plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Draw figures.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
@@ -65,7 +69,7 @@ def run(
     reported with the quantity and the time, and the exit code is 0.
     """
     from springline.runner.files import table_files, units, write_folder
-    from springline.runner.run import simulate
+    from springline.runner.run import simulate, trajectory_hash
     from springline.runner.scenario import load_scenario, packaged_scenarios
 
     loaded = load_scenario(scenario, overrides(changes, scenario))
@@ -84,12 +88,15 @@ def run(
     write_folder(folder, files, replaces=OUTPUTS)
     for note in loaded.notes:
         complain(note)
+    sha256 = {"sha256": trajectory_hash(result.trajectory)} if with_hash else {}
     if as_json:
-        print_json("run", result.metrics.to_pylist(), units(result.metrics), result.status)
+        print_json("run", result.metrics.to_pylist(), units(result.metrics), result.status, **sha256)
         return
     print_metrics(result, loaded.system().joints)
     say(f"results: {folder}")
     say(result.message)
+    for name, value in sha256.items():
+        say(f"{name} {value}")
 
 
 def _refuse_own_inputs(folder: Path, source: str, scenario: Scenario) -> None:

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from springline.codegen.export import check_files
+from springline.codegen.export import LONGEST, LONGEST_LINKED, bind, check_files, check_linked
+from springline.codegen.export.c import TypedInterface, text_files
 from springline.codegen.export.names import check_prefix
+from springline.runner.scenario import load_scenario
 
 
 def accepted(prefix: str) -> bool:
@@ -22,7 +24,7 @@ def accepted(prefix: str) -> bool:
 @pytest.mark.parametrize(
     "prefix",
     ["arm", "Crane2", "springline", "my_arm", "controller", "plant", "loop", "floats", "stdio_arm", "mathematics",
-     "slow", "time_varying", "sea_state", "femur", "semi", "x", "fmu_test_loop_fmi2", "a" * 100],
+     "slow", "time_varying", "sea_state", "femur", "semi", "x", "fmu_test_loop_fmi2", "a" * LONGEST],
 )  # fmt: skip
 def test_ordinary_names_are_fine(prefix: str) -> None:
     check_prefix(prefix)
@@ -33,7 +35,7 @@ def test_ordinary_names_are_fine(prefix: str) -> None:
     [
         ("2fast", "no C identifier"), ("a-b", "no C identifier"), ("", "no C identifier"), ("été", "no C identifier"),
         ("arm\n", "no C identifier"), ("_arm", "no C identifier"),
-        ("a" * 101, "100 at most"), ("my__arm", "two _"), ("arm_", "two _"),
+        ("a" * 64, "63 at most: by so many C99"), ("my__arm", "two _"), ("arm_", "two _"),
         ("float", "keyword"), ("Float", "keyword"), ("xor_eq", "keyword"), ("co_await", "keyword"),
         ("typeof", "keyword"),
         ("stdio", "stdio.h"), ("Math", "math.h"), ("STDINT", "stdint.h"), ("unistd", "unistd.h"),
@@ -47,6 +49,21 @@ def test_ordinary_names_are_fine(prefix: str) -> None:
 def test_refusals_say_why(prefix: str, why: str) -> None:
     with pytest.raises(ValueError, match=why):
         check_prefix(prefix)
+
+
+def test_a_linker_that_reads_31_characters_tells_the_functions_apart() -> None:
+    """At the longest prefix, and at no longer one."""
+    longest = "a" * LONGEST_LINKED
+    check_linked(longest)
+    with pytest.raises(ValueError, match=r"has 27 characters, expected 26 at most: C99 promises that a linker"):
+        check_linked(f"{longest}a")
+    scenario = load_scenario("paper/nominal")
+    for prefix, distinct in ((longest, True), (f"{longest}a", False)):
+        export = bind(scenario.structure(), scenario.values(), prefix=prefix)
+        header = text_files(export, TypedInterface(export))[f"include/{prefix}.h"].decode()
+        names = re.findall(rf"^(?:extern )?[a-z].*?\b({prefix}_\w+)[\[(;]", header, re.MULTILINE)
+        assert {f"{prefix}_{name}" for name in ("init", "step", "start", "status_text", "base_nodes")} <= set(names)
+        assert (len({name[:31] for name in names}) == len(set(names))) is distinct
 
 
 def test_no_standard_header_of_this_compiler_is_accepted(require_tool: Callable[..., str]) -> None:

@@ -11,6 +11,7 @@ import os
 import re
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -142,6 +143,27 @@ def test_the_engines_write_the_same_bytes(results: Path) -> None:
     written = contents(Path("casadi"))
     assert set(written) == {"scenario.toml", "trajectory.parquet", "metrics.parquet"}
     assert written.items() <= contents(results).items()
+
+
+def stored_hash(path: Path) -> str:
+    """SHA-256 of the columns of doubles in a stored table, one after the other, null a quiet NaN."""
+    table = read_table(path)
+    columns = [table[field.name].to_pylist() for field in table.schema if field.type == "double"]
+    quiet = bytes.fromhex("7ff8000000000000")[::-1]
+    data = [quiet if value is None else struct.pack("<d", value) for column in columns for value in column]
+    assert len(data) == table.num_rows * table.num_columns > 0
+    return hashlib.sha256(b"".join(data)).hexdigest()
+
+
+@pytest.mark.parametrize("engine", ["lanes", "casadi"])
+def test_run_prints_a_hash_of_the_trajectory_last(results: Path, engine: str) -> None:
+    wanted = stored_hash(results / "trajectory.parquet")
+    options = ("run", "short.toml", "-o", "out", "--no-plot", "--engine", engine, "--hash")
+    assert done(*options).splitlines()[-1] == f"sha256 {wanted}"
+    answer = json.loads(done(*options, "--force", "--json"))
+    assert answer["sha256"] == wanted
+    changed = done(*options, "--force", "--set", "control.delta=0.03").splitlines()[-1]
+    assert changed == f"sha256 {stored_hash(Path('out/trajectory.parquet'))}" != f"sha256 {wanted}"
 
 
 def test_run_shows_metrics_with_units_and_where_the_results_are() -> None:

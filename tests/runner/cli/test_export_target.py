@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import springline.codegen.export as package
-from springline.codegen.export import targets
+from springline.codegen.export import Target, targets
 from springline.runner.cli import app
 from springline.runner.cli.application import export
 from springline.runner.cli.commands.target import target_command
@@ -24,10 +25,12 @@ More.
 import lazy_loader
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+options = ("prefix",)
 '''
 WORK = """
 def target_files(export):
-    return {"gains/k1.txt": f"{export.value('control.k1')} {export.period}".encode()}
+    free = [slot.key for slot in export.tunable_slots]
+    return {"gains/k1.txt": f"{export.value('control.k1')} {export.period} {free} {export.prefix}".encode()}
 """
 
 
@@ -43,8 +46,8 @@ def gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.chdir(tmp_path / "cwd")
     monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder.parent)])
     monkeypatch.setattr(export, "registered_commands", list(export.registered_commands))
-    for name, description in targets().items():
-        export.command(name)(target_command(name, description))
+    for name, found in targets().items():
+        export.command(name)(target_command(name, found))
     yield
     for name in [name for name in sys.modules if name.startswith("springline.codegen.export.gains")]:
         del sys.modules[name]
@@ -61,10 +64,36 @@ def test_the_packaged_targets_have_commands_of_their_own() -> None:
 
 @pytest.mark.usefixtures("gains")
 def test_a_folder_is_a_target_and_its_docstring_the_help() -> None:
-    assert targets() == {"gains": "Write the gains as text."}
+    assert targets() == {"gains": Target("Write the gains as text.", ("prefix",))}
     assert "gains  Write the gains as text." in springline("--help").output
-    shown = springline("gains", "--help").output
-    assert all(option in shown for option in ("--output", "--set", "--no-code", "--force", "--json"))
+
+
+@pytest.mark.usefixtures("gains")
+def test_it_has_the_options_of_c_but_for_what_its_door_does_not_name() -> None:
+    """--real alone is missing; --output has another default."""
+    options = {
+        target: set(re.findall(r"^  (?:-o, )?(--[a-z-]+)", springline(target, "--help").output, re.MULTILINE))
+        for target in ("c", "gains")
+    }
+    assert options["c"] - options["gains"] == {"--real"} and options["gains"] < options["c"]
+    assert {"--tunable", "--check", "--prefix", "--set"} <= options["gains"]
+    assert springline("gains", "paper/nominal", "--real", "float").exit_code == 2
+
+
+@pytest.mark.usefixtures("gains")
+def test_parameters_stay_variables_and_a_stale_folder_is_told() -> None:
+    options = ["--tunable", "control.k1,control.k2", "--prefix", "arm"]
+    assert springline("gains", "paper/nominal", *options).exit_code == 0
+    file = Path("gains/gains/k1.txt")
+    assert file.read_text() == "3.0 0.0001 ['control.k1', 'control.k2'] arm"
+    assert springline("gains", "paper/nominal", *options, "--check").exit_code == 0
+    stale = springline("gains", "paper/nominal", "--check")
+    assert stale.exit_code == 1 and "changed gains/k1.txt" in stale.output
+    assert "it was made with --tunable control.k1,control.k2 --prefix arm: check it with the same" in stale.output
+    assert file.read_text().endswith("arm")
+    for option, value in (("--tunable", "control.kk"), ("--prefix", "float")):
+        refused = springline("gains", "paper/nominal", option, value)
+        assert refused.exit_code == 2 and value in refused.output
 
 
 @pytest.mark.usefixtures("gains")
@@ -73,12 +102,13 @@ def test_it_is_written_whole_and_edited_files_are_kept() -> None:
     first = springline("gains", "paper/nominal", "--set", "control.k1=3.5", *sampled)
     assert first.exit_code == 0, first.output
     file = Path("gains/gains/k1.txt")
-    assert file.read_text() == "3.5 0.002"
+    assert file.read_text() == "3.5 0.002 [] springline"
     manifest = json.loads(Path("gains/manifest.json").read_bytes())
     assert manifest["kind"] == "gains" and [entry["path"] for entry in manifest["files"]] == ["gains/k1.txt"]
 
     again = springline("gains", "paper/nominal", "--set", "control.k1=3.5", *sampled, "--json")
-    assert json.loads(again.output)["rows"] == [{"path": "gains/k1.txt", "change": "unchanged"}]
+    rows = [{"path": path, "change": "unchanged"} for path in ("gains/k1.txt", "manifest.json")]
+    assert json.loads(again.output)["rows"] == rows
     file.write_text("mine")
     refused = springline("gains", "paper/nominal")
     assert refused.exit_code == 2 and file.read_text() == "mine"

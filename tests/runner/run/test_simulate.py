@@ -1,18 +1,20 @@
 """A single run: what its columns mean, what its last words are, and what is refused before it starts."""
 
+import hashlib
 import shutil
 from collections import namedtuple
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from typer.testing import CliRunner, Result
 
 from springline.codegen.kernel import METRICS, MOST_STEPS, LoopSettings, Runs
 from springline.runner.cli import app
 from springline.runner.files import InputError
-from springline.runner.run import metrics_schema, simulate
+from springline.runner.run import metrics_schema, simulate, trajectory_hash
 from springline.runner.run.simulation import outcome
 from springline.runner.scenario import load_scenario
 
@@ -20,6 +22,22 @@ from springline.runner.scenario import load_scenario
 def springline(*arguments: str | Path) -> Result:
     """Run a command in this process."""
     return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="springline")
+
+
+def test_a_trajectorys_hash_is_of_its_doubles_in_their_order() -> None:
+    """Null and NaN are one number, neither chunks nor other columns count, the order and a zero's sign do."""
+    t, x = [0.0, 0.5, 1.0], [1.0, None, -0.0]
+    wanted = hashlib.sha256(
+        bytes.fromhex("0000000000000000 000000000000e03f 000000000000f03f")
+        + bytes.fromhex("000000000000f03f 000000000000f87f 0000000000000080")
+    ).hexdigest()
+    assert trajectory_hash(pa.table({"t": t, "x": x})) == wanted
+    negative = -np.array([np.nan])[0]
+    assert trajectory_hash(pa.table({"t": t, "n": [1, 2, 3], "x": [1.0, negative, -0.0]})) == wanted
+    chunked = pa.chunked_array([pa.array([1.0]), pa.array([None, -0.0], pa.float64())])
+    assert trajectory_hash(pa.table({"t": t, "x": chunked})) == wanted
+    for other in ({"x": x, "t": t}, {"t": t, "x": [1.0, None, 0.0]}, {"t": t}):
+        assert trajectory_hash(pa.table(other)) != wanted
 
 
 def test_every_metric_has_the_unit_of_what_it_measures() -> None:

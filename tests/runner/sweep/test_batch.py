@@ -44,9 +44,9 @@ from springline.runner.sweep import (
     run_sweep,
     stored_plan,
     summarize,
-    summary_figures,
     versions,
 )
+from springline.runner.sweep.figures import summary_figures
 from springline.runner.sweep.forecast import dataset_bytes
 from springline.runner.sweep.influence import rank_correlation
 from springline.runner.sweep.places import Folder

@@ -13,7 +13,7 @@ from springline.runner.files import InputError
 from springline.runner.scenario import packaged_sweeps
 from springline.runner.sweep import Plan, load_sweep, sampling
 from springline.runner.sweep.plan import MOST_GROUPS
-from springline.runner.sweep.sweep import sweep_from_json
+from springline.runner.sweep.sweep_file import sweep_from_json
 
 Write = Callable[..., Path]
 

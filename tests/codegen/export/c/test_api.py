@@ -111,7 +111,7 @@ def test_the_same_bytes_from_another_process_and_folder(nominal: tuple[dict[str,
 
 def test_manifest(nominal: tuple[dict[str, bytes], dict]) -> None:
     manifest = json.loads(canonical_json(nominal[1]))
-    assert set(manifest) == {"springline", "casadi", "hash", "parameters", "functions"}
+    assert set(manifest) == {"springline", "casadi", "hash", "options", "parameters", "functions"}
     assert [item["name"] for item in manifest["parameters"]] == [slot.key for slot in SLOTS]
     assert {item["binding"] for item in manifest["parameters"]} == {"baked"}
     by_name = {item["name"]: item for item in manifest["parameters"]}

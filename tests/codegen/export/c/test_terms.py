@@ -12,6 +12,7 @@ from typing import Any
 
 import casadi as ca
 import pytest
+from printed import with_whole_comments
 
 from springline.codegen.export import bind
 from springline.codegen.export.c import generate_files
@@ -47,8 +48,8 @@ def source(scenario: str = "paper/nominal", **changes: object) -> str:
 
 def constants(text: str) -> Iterator[tuple[str, float, str]]:
     """Name, value and comment of each constant."""
-    joined = re.sub(r"\n {20,}", " ", text)  # comments that go on in the next line
-    for name, value, comment in re.findall(r"^  const double (\w+) = (\S+); +/\* (.*) \*/$", joined, re.MULTILINE):
+    found = re.findall(r"^  const double (\w+) = (\S+); +/\* (.*) \*/$", with_whole_comments(text), re.MULTILINE)
+    for name, value, comment in found:
         yield name, float(value), comment
 
 
@@ -97,7 +98,7 @@ def test_a_body_tells_the_names_of_its_constants() -> None:
 def test_flags_of_limits_name_the_limit() -> None:
     for joint in ("lift", "rotation"):
         limit, law = f"control_a_max_{joint}", f"dsigma_{joint}"
-        assert f"{law} < -{limit} || {law} > {limit};" in " ".join(source().split())
+        assert f"({law} < -{limit}) || ({law} > {limit});" in " ".join(source().split())
 
 
 def test_what_comes_from_several_says_how_to_the_last_bit() -> None:
