@@ -168,6 +168,7 @@ class _Printer:
 
     def text(self) -> str:
         """Types and functions."""
+        sources = {name: source for name, source in self.sources.items() if name in self.used}
         graph = ValueGraph()
         now, outside = self._sampled(graph, "now", Binding.RUN)
         before, _ = self._sampled(graph, "before", Binding.RUN)
@@ -179,7 +180,8 @@ class _Printer:
 
         places = {"now": "at.{}", "first": "m->first.{}", "before": "m->last.{}", "settings": "slv_set(job->{})"}
         start = _Statements(graph, "slv", self._load(places))
-        start.add("m->first = m->last = at;")
+        for name in sources:
+            start.add(f"m->first.{name} = m->last.{name} = at.{name};")
         for i, place in once.items():
             start.add(f"{place} = {start.number(i)};")
         for k, fold in enumerate(self.folds):
@@ -187,9 +189,9 @@ class _Printer:
         sample = _Statements(graph, "slv", self._load(places), once)
         for k, fold in enumerate(self.folds):
             self._gather(sample, k, fold, now[k], before[k], outside)
-        sample.add("m->last = at;")
+        for name in sources:  # compilers copy the structure as a whole in pieces of 8 bytes
+            sample.add(f"m->last.{name} = at.{name};")
 
-        sources = {name: source for name, source in self.sources.items() if name in self.used}
         members = "".join(f"  sl_v {name};\n" for name in sources)
         taken = "".join(f"\n    .{name} = {source}," for name, source in sources.items())
         gathered = [
