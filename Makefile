@@ -61,7 +61,7 @@ clean: ## remove what the other verbs made; results in OUT stay
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The dependencies change with pyproject.toml. The package itself is linked file by file, so it is installed
-# anew when a file comes or goes; no network is needed for that.
+# anew when a file comes or goes, or setup.py changes; no network is needed for that.
 .venv/dependencies: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "springline needs Python 3.11 or later: make PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv
@@ -72,6 +72,6 @@ clean: ## remove what the other verbs made; results in OUT stay
 .venv/files: .venv/dependencies FORCE
 	@printf '%s\n' $(SHIPPED) | cmp -s - $@ || printf '%s\n' $(SHIPPED) > $@
 
-.venv/installed: .venv/dependencies .venv/files
+.venv/installed: .venv/dependencies .venv/files setup.py
 	$(PIP) --no-deps --editable .
 	@touch $@

@@ -127,28 +127,3 @@ U_F = Quantity("U_f", "U_f", "{F}", "fast part of the command, before its limit"
 A_LAW = Quantity("a_law", "a", "{q}/s^2", "acceleration that the reaching law asks for before a_max")
 SATURATED = Quantity("saturated", "U = U_{max}", "0 or 1", "whether U_max limits the command")
 A_LIMITED = Quantity("a_limited", "a = a_{max}", "0 or 1", "whether a_max limits the reaching law")
-
-METRICS = (
-    Quantity("response_time", "t_r", "s", "first time with |e| inside the response band"),
-    Quantity(
-        "settling_time", "t_s", "s", "last time with |e| outside the settling band, unless in the last 2 % of the run"
-    ),
-    Quantity("overshoot", r"e_o", "{q}", "largest excursion of e past zero, against the sign of e(0)"),
-    Quantity("steady_state_error", r"e_\infty", "{q}", "largest |e| over the last quarter of the run"),
-    Quantity("rms_error", r"e_{rms}", "{q}", "root of the mean of e^2, by the trapezoid rule"),
-    Quantity("iae", r"\int |e|", "{q} s", "integral of |e|, by the trapezoid rule"),
-    Quantity("U_max", r"U_{max}", "{F}", "largest |U|"),
-    Quantity("U_rms", r"U_{rms}", "{F}", "root of the mean of U^2, by the trapezoid rule"),
-    Quantity(
-        "chatter",
-        "c",
-        "1/s",
-        "total variation of U over the second half of the run, by that half's length and by the larger of the range of "
-        "U in it and 1e-3 of U_max; 0 for a U that stands still",
-    ),
-    Quantity("U_tv", "TV(U)", "{F}", "total variation of U after the settling time"),
-    Quantity("sigma_tv", r"TV(\sigma)", "{q}/s", "total variation of the sliding variable after the settling time"),
-    Quantity("dq1_tv", r"TV(\dot q_1)", "{q}/s", "total variation of the joint rate after the settling time"),
-)
-"""What a run is judged by, in the order of the columns; runtime/metrics.h computes them. Null where there is none:
-never reached, not settled, e(0) = 0, or the run stopped before."""

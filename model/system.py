@@ -48,6 +48,7 @@ from springline.model.dynamics import EquationsOfMotion, equations_of_motion
 from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.mechanisms import MECHANISMS, Mechanism, expect_plausible
+from springline.model.metrics import METRICS
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
 from springline.model.quantities import (
     A_LAW,
@@ -56,7 +57,6 @@ from springline.model.quantities import (
     DISTURBANCE,
     DQ1,
     DQ2,
-    METRICS,
     Q1,
     Q1D,
     REFERENCE,

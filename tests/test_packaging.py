@@ -108,6 +108,22 @@ def test_wheel_carries_every_shipped_file(wheel: set[str]) -> None:
     assert {f"{package}/py.typed" for package in PACKAGES if package != "generated"} <= shipped
 
 
+def test_a_new_folder_is_shipped_with_its_templates_and_without_what_is_not_ours(tmp_path: Path) -> None:
+    """Found, not listed: an export target is a folder and nothing else."""
+    for folder in (*PACKAGES, "springline"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    for file in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
+        shutil.copy(ROOT / file, tmp_path)
+    target = tmp_path / "codegen/export/constants"
+    ours = {"__init__.py", "__init__.pyi", "files.py", "templates/constants.toml.j2"}
+    for name in (*ours, "__pycache__/files.cpython-311.pyc", ".files.py.swp"):
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        (target / name).touch()
+    run(*PYTHON, "setup.py", "--quiet", "build_py", "--build-lib", "built", cwd=tmp_path)
+    built = tmp_path / "built/springline/codegen/export/constants"
+    assert {path.relative_to(built).as_posix() for path in built.rglob("*") if path.is_file()} == ours
+
+
 def test_wheel_metadata(dist: Path, wheel: set[str]) -> None:
     (path,) = dist.glob("*.whl")
     with zipfile.ZipFile(path) as archive:
@@ -128,7 +144,7 @@ def test_wheel_metadata(dist: Path, wheel: set[str]) -> None:
 
 def test_sdist_can_be_built_and_tested_from(sdist: set[str]) -> None:
     assert tree(*CARRIED) <= sdist
-    assert {"CHANGELOG.md", "LICENSE", "Makefile", "README.md", "pyproject.toml"} <= sdist
+    assert {"CHANGELOG.md", "LICENSE", "Makefile", "README.md", "pyproject.toml", "setup.py"} <= sdist
     assert not {name for name in sdist if name.endswith((".pyc", ".so"))}
 
 

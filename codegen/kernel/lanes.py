@@ -15,6 +15,7 @@ from functools import partial
 
 import casadi as ca
 
+from springline.codegen.kernel.metrics import print_metrics
 from springline.codegen.kernel.schedule import longest_chain_first
 from springline.codegen.program import (
     KEYWORDS,
@@ -496,7 +497,7 @@ def emit(program: Program, baked: Mapping[str, float], groups: int) -> Emission:
     Raises UnprintableOperation, naming the operation.
     """
     emitter = _Emitter(program, baked, groups)
-    text = emitter.text()
+    text = f"{emitter.text()}\n{print_metrics(program.system)}"
     sizes = {
         "p": len(emitter.graph.tunable),
         "r": len(emitter.slots[Binding.RUN]),

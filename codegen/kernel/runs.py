@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen.kernel.job import STATUSES
-from springline.model import quantities
+from springline.model import metrics
 from springline.model.system import System
 
 Floats = NDArray[np.float64]
 
 
-METRICS = tuple(metric.name for metric in quantities.METRICS)
+METRICS = tuple(metric.name for metric in metrics.METRICS)
 """Names of the metrics of each joint, in their order."""
 
 STATUS = tuple(STATUSES)

@@ -11,9 +11,10 @@ from importlib import resources
 
 from springline.codegen.kernel import lanes, toolchain
 from springline.codegen.kernel.job import job_header
+from springline.codegen.kernel.metrics import print_metrics
 from springline.codegen.kernel.spec import KernelOptions, KernelSpec
 from springline.codegen.program import Program, casadi_c, kernel_update
-from springline.model.quantities import METRICS, entries
+from springline.model.quantities import entries
 
 _RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
 
@@ -55,7 +56,6 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
     }
     assert program.size("d") == len(program.system.tables) + 4 * channels
     enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
-    metrics = "".join(f"  SL_{metric.name.upper()},\n" for metric in METRICS)
     return f"""#define SL_W {width}
 #define SL_G {groups}
 #define SL_PACKS {packs}
@@ -63,6 +63,8 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
 #define SL_NZ {memory}
 #define SL_SLIDING {sliding}
 #define SL_NTIP {len(program.system.observed)}
+#include "metrics.h"
+#include "simulate.h"
 #include "sl_lanes.h"
 
 typedef sl_v sl_group[SL_G]; /* one quantity of a pack of runs */
@@ -74,10 +76,6 @@ typedef struct {{
 }} sl_time;
 
 enum {{ {enum} }};
-
-enum {{
-{metrics}  SL_METRICS_PER_JOINT
-}};
 
 /* On vectors an evaluation stands by itself: inlined into the loop it would share its registers, and spill them. */
 #if SL_W > 1
@@ -102,6 +100,7 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
         sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
         start = preamble(program, width=1, groups=1, packs=1, sampled=sampled, sizes=sizes)
         parameters = tuple(slot.key for slot in slots)
+        start = f"{start}\n{print_metrics(program.system)}"
         files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}
     else:
         width = options.width or toolchain.native_vector_width(options.compiler)

@@ -8,6 +8,7 @@
  *                (values bound once per run; once per time and the same for all runs; once per time and run), SL_ND,
  *                SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller has a sliding variable) 0 or 1
  *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals; kernel_tip, for rows alone, where SL_NTIP > 0
+ *   the metrics: SL_METRICS_PER_JOINT, sl_sample, sl_metrics, kernel_sample, kernel_metrics_start, _sample and _finish
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
  *                needed for long), sl_node, sl_when, sl_kept, kernel_update
@@ -23,7 +24,6 @@
 
 #include "kernel.h"
 #include "simulate.h"
-#include "metrics.h"
 
 enum {
   SL_PACK = SL_W * SL_G,
@@ -86,6 +86,7 @@ typedef struct {
   sl_time times[SL_INSTANTS + 1];                 /* the nodes of the step, and its end */
   sl_group varying[SL_INSTANTS + 1][SL_NV + 1];   /* what varies at these times, in turn */
   sl_group low[SL_NJ], high[SL_NJ]; /* limits of q1, where the job has some; those of a lane that has ended are none */
+  int64_t samples;                  /* that the metrics have seen */
   sl_metrics metrics[SL_NJ][SL_G];
   sl_clock *clock;
 } sl_pack;
@@ -153,12 +154,13 @@ static void finish_lane(sl_pack *pack, int lane, int64_t k, enum sl_status statu
   const sl_job *job = pack->job;
   const int64_t run = pack->run[lane];
   const double end = step_time(job, k), half = (double)(job->steps - job->steps / 2) * job->step;
+  const sl_span span = {job->start_time, end - job->start_time, half, job->step, status == SL_OK};
+  double *metrics = job->metrics + run * SL_NMETRICS;
   int i;
   for (i = 0; i < SL_NX; i++) job->final_state[run * SL_NX + i] = lane_of(pack->x[i], lane);
-  for (i = 0; i < SL_NJ; i++) {
-    sl_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, job->start_time, end, job->step, half,
-                      status == SL_OK, job->metrics + run * SL_NMETRICS + i * SL_METRICS_PER_JOINT);
-    if (!SL_SLIDING) job->metrics[run * SL_NMETRICS + i * SL_METRICS_PER_JOINT + SL_SIGMA_TV] = SL_NAN;
+  for (i = 0; i < SL_NMETRICS; i++) metrics[i] = SL_NAN;
+  for (i = 0; i < SL_NJ && pack->samples > 0; i++) {
+    kernel_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, span, job, metrics + i * SL_METRICS_PER_JOINT);
   }
   job->end_time[run] = end;
   job->status[run] = (int32_t)status;
@@ -239,22 +241,21 @@ SL_RARE void stop_overflows(sl_pack *pack, int64_t k, sl_time now) {
 /* Metrics and trajectory at step k, where e, sigma, u belong to x. */
 static void observe(sl_pack *pack, int64_t k, sl_time now) {
   const sl_job *job = pack->job;
-  const int64_t middle = job->steps / 2;
-  const sl_instant instant = {step_time(job, k), k == middle, k > middle, 4 * k >= 3 * job->steps};
+  const int64_t middle = job->steps / 2, last = job->steps;
+  const sl_instant instant = {step_time(job, k), k > 0, k >= middle, k > middle, 4 * k >= 3 * last, 4 * (k - 1) >= 3 * last};
+  const sl_group *x = (const sl_group *)pack->x, *u = (const sl_group *)pack->u, *e = (const sl_group *)pack->e;
+  const sl_group *sigma = (const sl_group *)pack->sigma;
   int i, g;
   for (i = 0; k == 0 && i < SL_NJ; i++) {
-    for (g = 0; g < SL_G; g++) {
-      sl_metrics_start(&pack->metrics[i][g], pack->e[i][g], pack->u[i][g], pack->sigma[i][g], pack->x[SL_NJ + i][g],
-                       job);
-    }
+    for (g = 0; g < SL_G; g++) kernel_metrics_start(&pack->metrics[i][g], kernel_sample(x, u, e, sigma, i, g), job);
   }
   if (!control_is_finite(pack)) stop_overflows(pack, k, now);
   for (i = 0; i < SL_NJ; i++) {
     for (g = 0; g < SL_G; g++) {
-      sl_metrics_sample(&pack->metrics[i][g], instant, pack->e[i][g], pack->u[i][g], pack->sigma[i][g],
-                        pack->x[SL_NJ + i][g]);
+      kernel_metrics_sample(&pack->metrics[i][g], instant, kernel_sample(x, u, e, sigma, i, g));
     }
   }
+  pack->samples = k + 1;
   if (job->output_every > 0 && (k % job->output_every == 0 || k == job->steps)) write_row(pack, k, now, 0, pack->lanes);
 }
 
@@ -320,6 +321,7 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
   pack->next = pack->states[1];
   pack->lanes = (int)(job->last - first < SL_PACK ? job->last - first : SL_PACK);
   pack->live = pack->lanes;
+  pack->samples = 0;
   for (lane = 0; lane < SL_PACK; lane++) {
     const int64_t run = first + (lane < pack->lanes ? lane : pack->lanes - 1);
     pack->run[lane] = run;

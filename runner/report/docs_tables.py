@@ -1,4 +1,4 @@
-"""Tables of the documentation that are printed from the declarations in springline.model.quantities.
+"""Tables of the documentation that are printed from the declarations in springline.model.
 
     python -m runner.report.docs_tables [--write]
 
@@ -15,8 +15,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from springline.model.base import COORDINATES
+from springline.model.metrics import METRICS
 from springline.model.parameters import Joint
-from springline.model.quantities import METRICS, Quantity
+from springline.model.quantities import Quantity
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 

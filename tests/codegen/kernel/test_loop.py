@@ -25,11 +25,12 @@ from springline.codegen.kernel import (
     toolchain,
 )
 from springline.codegen.kernel import compiled as kernel_module
+from springline.codegen.kernel import metrics as kernel_metrics
 from springline.codegen.kernel import source as kernel_source
 from springline.codegen.kernel.compiled import LayoutError, compile_kernel
 from springline.codegen.kernel.job import JOB, Job
 from springline.codegen.program import Program, SignalTable, program
-from springline.model import quantities
+from springline.model import metrics
 from springline.model.structure import SignalShape, Structure
 from springline.model.symbolic import as_written
 
@@ -119,7 +120,7 @@ def test_closed_loop_agrees_with_cvodes(values_of: Values) -> None:
 
 
 def metrics_by_hand(rows: NDArray[np.float64], joint: int, settings: LoopSettings) -> dict[str, float]:
-    """The definitions of metrics.h on a trajectory with every step."""
+    """The definitions of model/metrics.py on a trajectory with every step."""
     t, e, sigma, u, rate = rows[:, 0], rows[:, 11 + joint], rows[:, 13 + joint], rows[:, 15 + joint], rows[:, 3 + joint]
     size, start, late = np.abs(e), abs(e[0]), 4 * np.arange(len(t)) >= 3 * settings.steps
     inside = np.flatnonzero(size <= settings.response_band * start + settings.response_error)
@@ -602,8 +603,8 @@ def test_results_beyond_the_memory_are_refused_before_it_is_asked_for(
 def test_a_metric_that_only_one_side_knows_is_an_error(shaken: Program, monkeypatch: pytest.MonkeyPatch) -> None:
     """The C has one more than Python, which would have it write past the end of its array."""
     here = len(shaken.system.metrics)
-    jerk = replace(quantities.METRICS[-1], name="jerk")
-    monkeypatch.setattr(kernel_source, "METRICS", (*quantities.METRICS, jerk))
+    jerk = replace(metrics.METRICS[-1], name="jerk")
+    monkeypatch.setattr(kernel_metrics, "METRICS", (*metrics.METRICS, jerk))
     with pytest.raises(LayoutError, match=f"metrics: {here + shaken.system.n}, expected {here}"):
         compiled(shaken)
 
