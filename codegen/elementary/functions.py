@@ -38,7 +38,7 @@ _f = float.fromhex
 
 def fabs(x: Word) -> Word:
     """|x|."""
-    return real(bits(x) & ~SIGN_BIT & (2**64 - 1))
+    return real(bits(x) & (2**63 - 1))
 
 
 def copysign(x: Word, sign: Word) -> Word:

@@ -15,7 +15,9 @@ from functools import partial
 
 import casadi as ca
 
-from springline.codegen.kernel.schedule import longest_chain_first
+from springline.codegen.kernel.blocks import Block, Translator, printed, tableau_step
+from springline.codegen.kernel.order import longest_chain_first
+from springline.codegen.kernel.schedule import scheduled
 from springline.codegen.program import (
     KEYWORDS,
     MASKS,
@@ -25,6 +27,7 @@ from springline.codegen.program import (
     LoopGraph,
     Program,
     formula,
+    kept_slopes,
     literal,
     print_operation,
 )
@@ -391,37 +394,14 @@ class _Emitter:
             return lambda k, g: f"{name}[{k}][{g}]"
 
         def state(name: str, signature: str, results: Mapping[str, int]) -> str:
-            """A fast version, and one that knows the rare cases and is called where the fast one does not hold."""
+            """The complete function, for where a block does not hold, and for the end of a run."""
             targets = [f"{result}[{i}]" for result, count in results.items() for i in range(count)]
             arguments = f"{signature}, {given},\n    {', '.join(f'sl_group *{result}' for result in results)}"
-            names = ", ".join(re.findall(r"\w+(?=,|$)", arguments))
-            groups = [str(g) for g in range(self.groups)]
-            wanted = self.state_functions[name]
-
-            def target(k: int, g: str) -> str:
-                return f"{targets[k]}[{g}]"
-
-            checked = self._function(f"{name}_checked", arguments, wanted, Binding.STATE, target, self._given, ["g"])
-            masks = [f"ok_{g}" if self.groups > 1 else "ok" for g in groups]
-            lines, self.counts[name] = self._body(
-                wanted,
-                Binding.STATE,
-                self._given,
-                lambda k, value, g: f"{target(k, g)} = {value};",
-                groups,
-                "  ",
-                fast=True,
-                at_once=range(results.get("dx", 0), len(targets)),
+            printed = self._function(
+                name, arguments, self.state_functions[name], Binding.STATE, lambda k, g: f"{targets[k]}[{g}]",
+                self._given, ["g"],
             )
-            fast = [
-                f"/* {self.counts[name]} operations a run */",
-                f"SL_EVALUATION void kernel_{name}({arguments}) {{",
-                *(f"  sl_m {mask} = slv_yes();" for mask in masks),
-                *lines,
-                f"  if (!SL_LIKELY(slv_all({' & '.join(masks)}))) kernel_{name}_checked({names});",
-                "}\n",
-            ]
-            return "\n".join([checked.replace("static inline", "SL_RARE"), *fast])
+            return printed.replace("static inline", "SL_RARE")
 
         at_row = f"double time, const double *data, const sl_group *x, {given}, sl_group *tip"
         tip = (
@@ -484,11 +464,124 @@ class _Emitter:
                 state("control", sampling, sample),
                 state("error", now, {"e": n, "sigma": n}),
                 state("plant", f"{now}, const sl_group *u", {"dx": states}),
+                *self._blocks(),
+            ]
+        )
+
+    # -- blocks -----------------------------------------------------------------------------------------------
+
+    def _blocks(self) -> list[str]:
+        """The functions that take packs through a step, block by block, and the table of them."""
+        tableau = self.program.system.tableau
+        every = range(tableau.stages)
+        spans = [list(every)] if self.span == "step" else [[k] for k in every]
+        factors: dict[float, int] = {}
+        variants = ("sample", "held") if self.sampled else ("closed",)
+        functions = []
+        for number, stages in enumerate(spans):
+            for variant in variants if number == 0 else variants[:1]:
+                functions.append(self._block(f"{variant}_{number}", variant, stages, factors))
+        names = [f"kernel_{variants[0]}_{number}" for number in range(len(spans))]
+        text = [
+            f"enum {{ SL_BLOCKS = {len(spans)}, SL_PER_BLOCK = {len(spans[0])}, SL_GAINS = {len(factors)} }};",
+            f"static const double sl_gain[SL_GAINS] = {{{', '.join(map(literal, factors))}}};",
+            *functions,
+            f"static const sl_block sl_blocks[SL_BLOCKS] = {{{', '.join(names)}}};",
+        ]
+        if self.sampled:
+            text.append("static const sl_block sl_held = kernel_held_0;")
+        return text
+
+    def _block(self, name: str, variant: str, stages: Sequence[int], factors: dict[float, int]) -> str:
+        program, system, outputs = self.program, self.program.system, self.graph.outputs
+        n, plant, memory = system.n, program.size("x"), program.size("z")
+        block = Block()
+
+        def load(i: int, instant: int) -> str:
+            node = self.graph.nodes[i]
+            source, k = node.source
+            if source in ("p", "u"):
+                return f"{source}[{k}][@]"
+            if source == "z":  # sampled: held, so only ever those at the beginning of the step
+                return f"x[{plant + k}][@]"
+            if source == "x":
+                return f"x[{k}][@]"
+            if source == "h":
+                return "slv_set(period)"
+            if node.binding is Binding.RUN:
+                return f"r[{self.slots[Binding.RUN][i]}][@]"
+            if node.binding is Binding.UNIFORM:
+                return f"slv_set(times[{instant}].uniform[{self.slots[Binding.UNIFORM][i]} * SL_W])"
+            return f"times[{instant}].varying[{self.slots[Binding.VARYING][i]}][@]"
+
+        translator = Translator(block, self.graph, load, self._assumed_power, {})
+        kept = kept_slopes(system.tableau)
+        command: list[int] = [block.load(f"u[{k}][@]") for k in range(n)] if self.sampled else []
+
+        def store_all(targets: Mapping[str, Sequence[int]]) -> None:
+            for vector, places in targets.items():
+                block.stores += [(f"{vector}[{k}][@]", place) for k, place in enumerate(places)]
+
+        def slope(stage: int, at: Sequence[int]) -> Sequence[int]:
+            nonlocal command
+            where = {("x", k): at[k] for k in range(plant)} | {("z", k): at[plant + k] for k in range(len(at) - plant)}
+            when = system.tableau.when[stage]
+            shown = ("u", "e", "sigma", "wished", "a_law")
+            if not self.sampled:
+                dx = self.state_functions["closed"]
+                places = translator.stage(dx if stage == 0 else dx[: len(at)], where, when)
+                if stage == 0:
+                    rest = places[len(at) :]
+                    store_all({q: rest[k * n : (k + 1) * n] for k, q in enumerate(shown)})
+                return places[: len(at)]
+            if stage == 0:
+                sample = variant == "sample"
+                wanted = self.state_functions["control" if sample else "error"]
+                places = translator.stage(wanted, where, when)
+                names = shown if sample else ("e", "sigma")
+                store_all({q: places[k * n : (k + 1) * n] for k, q in enumerate(names)})
+                if sample:
+                    command = places[:n]
+                    block.stores += [(f"next[{plant + k}][@]", p) for k, p in enumerate(places[5 * n :])]
+                else:
+                    block.stores += [(f"next[{plant + k}][@]", block.load(f"x[{plant + k}][@]")) for k in range(memory)]
+            given = where | {("u", k): command[k] for k in range(n)}
+            return translator.stage(list(outputs["plant"][0]), given, when)
+
+        def vector(what: str, i: int) -> str:
+            if what.startswith("slope_"):
+                return f"kept[{kept.index(int(what.removeprefix('slope_')))}][{i}][@]"
+            return f"{what}[{i}][@]"
+
+        tableau_step(
+            block,
+            system.tableau,
+            stages,
+            plant + (0 if self.sampled else memory),
+            load=lambda what, i: block.load(vector({"at": "from"}.get(what, what), i)),
+            slope=slope,
+            gain=lambda factor: block.load(f"gains[{factors.setdefault(factor, len(factors))}]"),
+            store=lambda what, i, place: block.stores.append((vector(what, i), place)),
+        )
+        order = scheduled(block, self.most)
+        self.counts[name] = len(order.places)
+        lines = printed(block, order.places, self.groups, "  ")
+        masks = [f"ok_{g}" if self.groups > 1 else "ok" for g in range(self.groups)]
+        return "\n".join(
+            [
+                f"/* {self.counts[name]} operations a run, {order.alive} values at once */",
+                f"SL_BLOCK_FUNCTION int kernel_{name}(SL_BLOCK_ARGUMENTS) {{",
+                *(f"  sl_m {mask} = slv_yes();" for mask in masks),
+                *lines,
+                f"  return slv_all({' & '.join(masks)});",
+                "}\n",
             ]
         )
 
 
-def emit(program: Program, baked: Mapping[str, float], groups: int) -> Emission:
+def emit(
+    program: Program, baked: Mapping[str, float], groups: int, *, sampled: bool, span: str = "stage", most: int = 12
+) -> Emission:
     """Print the kernel of a Program.
 
     baked   slot key -> value of the parameters that become constants; the others are read per run
@@ -496,6 +589,7 @@ def emit(program: Program, baked: Mapping[str, float], groups: int) -> Emission:
     Raises UnprintableOperation, naming the operation.
     """
     emitter = _Emitter(program, baked, groups)
+    emitter.sampled, emitter.span, emitter.most = sampled, span, most
     text = emitter.text()
     sizes = {
         "p": len(emitter.graph.tunable),

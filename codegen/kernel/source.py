@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -79,12 +80,15 @@ enum {{
 {metrics}  SL_METRICS_PER_JOINT
 }};
 
-/* On vectors an evaluation stands by itself: inlined into the loop it would share its registers, and spill them. */
-#if SL_W > 1
-#define SL_EVALUATION static __attribute__((noinline, unused))
-#else
-#define SL_EVALUATION static inline
-#endif
+/* A block stands by itself: inlined into the loop it would share its registers, and spill them. */
+#define SL_BLOCK_FUNCTION static __attribute__((noinline, unused))
+#define SL_BLOCK_ARGUMENTS \\
+  const sl_time *times, const sl_group *restrict x, const sl_group *restrict from, const sl_group *restrict p, \\
+      const sl_group *restrict r, const sl_v *restrict gains, double period, sl_group *restrict next, \\
+      sl_group *restrict at, sl_group (*restrict kept)[SL_NX], sl_group *restrict u, sl_group *restrict e, \\
+      sl_group *restrict sigma, sl_group *restrict wished, sl_group *restrict a_law
+
+typedef int (*sl_block)(SL_BLOCK_ARGUMENTS);
 
 {kernel_update(program.system.tableau, "SL_NX - SL_NZ" if sampled and memory else "SL_NX")}"""
 
@@ -101,17 +105,20 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
     if options.engine == "casadi":
         sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
         start = preamble(program, width=1, groups=1, packs=1, sampled=sampled, sizes=sizes)
+        start += f"\n#define SL_BLOCKED 0\nenum {{ SL_BLOCKS = {program.system.tableau.stages}, SL_PER_BLOCK = 1, SL_GAINS = 0 }};\n"
         parameters = tuple(slot.key for slot in slots)
         files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}
     else:
         width = options.width or toolchain.native_vector_width(options.compiler)
-        groups = options.groups or (2 if width > 1 else 1)
+        groups = options.groups or int(os.environ.get('GROUPS', 2 if width > 1 else 1))
         # The plant alone is a short evaluation and a long chain: others have to fill its gaps.
-        packs = options.packs or (2 if sampled and width > 1 else 1)
-        emission = lanes.emit(program, spec.constants, groups)
+        packs = options.packs or int(os.environ.get('PACKS', 2 if sampled and width > 1 else 1))
+        emission = lanes.emit(
+            program, spec.constants, groups, sampled=sampled, span=os.environ.get('SPAN','stage'), most=int(os.environ.get('MOST','12'))
+        )
         start = preamble(program, width=width, groups=groups, packs=packs, sampled=sampled, sizes=emission.sizes)
         parameters = emission.tunable
-        files = {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}"}
+        files = {**runtime_sources(), "kernel.h": f"{start}\n#define SL_BLOCKED 1\n{emission.text}"}
     return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)
 
 
@@ -119,7 +126,7 @@ def best_flags(compiler: toolchain.Compiler) -> tuple[str, ...]:
     """Optimisation flags that make the fastest kernel with this compiler on this machine."""
     flags = ("-O3", *toolchain.native_flags(compiler))
     if compiler.family == "gcc":  # its scheduler before register allocation hides the latencies
-        flags += ("-fschedule-insns", "-fsched-pressure", "-mtune=generic")
+        flags += tuple(os.environ.get("XFLAGS", "-fno-schedule-insns -fno-schedule-insns2 -mtune=generic").split())
     return flags
 
 
