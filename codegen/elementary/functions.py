@@ -6,7 +6,7 @@ What lies outside is a scalar function sl_<name>_rare in sl_math.h. Special valu
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
 
 from springline.codegen.elementary.words import (
     Kind,
@@ -165,9 +165,7 @@ def _rcbrt_parts(x: Word) -> tuple[Word, Word]:
     t = real((bits(x) >> 20) | 0x4330000000000000)
     y = real(bits(_f("0x1.55aa943ece2a5p+52") - t * _f("0x1.5555555555555p-2")) << 20)
     h = 1.0 - x * (y * y * y)
-    y = y + (y * h) * (
-        _f("0x1.5553d34e15d9fp-2") + h * (_f("0x1.c9afb5eeada12p-3") + h * _f("0x1.65cc774f45369p-3"))
-    )
+    y = y + (y * h) * (_f("0x1.5553d34e15d9fp-2") + h * (_f("0x1.c9afb5eeada12p-3") + h * _f("0x1.65cc774f45369p-3")))
     y = real(bits(y) & 0xFFFFFFF000000000)
     h = 1.0 - x * (y * y * y)
     d = h * (_f("0x1.5555555555555p-2") + h * (_f("0x1.c71c71c71c71cp-3") + h * _f("0x1.61f9add3c0ca4p-3")))
@@ -208,7 +206,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Computed], int]] = {
 }
 
 
-@lru_cache(maxsize=None)
+@cache
 def procedure(name: str) -> Procedure:
     """The steps of an elementary function."""
     function, inputs = FUNCTIONS[name]

@@ -93,6 +93,18 @@ class Procedure:
     fine: int | None
     inputs: int
 
+    @property
+    def needed(self) -> tuple[int, ...]:
+        """The steps that results and mask need, in order."""
+        found: set[int] = set()
+        stack = [*self.results, *([] if self.fine is None else [self.fine])]
+        while stack:
+            k = stack.pop()
+            if k not in found:
+                found.add(k)
+                stack.extend(self.steps[k].arguments)
+        return tuple(sorted(found))
+
 
 class _Trace:
     def __init__(self) -> None:

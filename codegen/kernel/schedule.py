@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from springline.codegen.elementary import Op
-from springline.codegen.kernel.blocks import Block
+from springline.codegen.kernel.block import Block
 
 LEAVES = frozenset({Op.INPUT, Op.REAL_CONSTANT, Op.BITS_CONSTANT, Op.REAL, Op.BITS})
 """What costs nothing where it stands: operands from memory, and other names of the same bits."""

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import resources
 
 from springline.codegen.kernel import lanes, toolchain
 from springline.codegen.kernel.job import job_header
+from springline.codegen.kernel.paying import Shape, what_pays
 from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.codegen.kernel.steps import print_steps
 from springline.codegen.program import Program, casadi_c, kernel_update
 from springline.model.quantities import METRICS, entries
 
@@ -38,7 +39,7 @@ class KernelSource:
         return hashlib.sha256(json.dumps([self.files, self.parameters]).encode()).hexdigest()
 
 
-def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: bool, sizes: Mapping[str, int]) -> str:
+def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes: Mapping[str, int]) -> str:
     """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
     memory, sliding = program.size("z"), len(program.system.sliding)
     channels = sum(len(table.channels) for table in program.system.tables)
@@ -58,8 +59,8 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
     enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
     metrics = "".join(f"  SL_{metric.name.upper()},\n" for metric in METRICS)
     return f"""#define SL_W {width}
-#define SL_G {groups}
-#define SL_PACKS {packs}
+#define SL_G {shape.groups}
+#define SL_PACKS {shape.packs}
 #define SL_SAMPLED {int(sampled)}
 #define SL_NZ {memory}
 #define SL_SLIDING {sliding}
@@ -80,16 +81,6 @@ enum {{
 {metrics}  SL_METRICS_PER_JOINT
 }};
 
-/* A block stands by itself: inlined into the loop it would share its registers, and spill them. */
-#define SL_BLOCK_FUNCTION static __attribute__((noinline, unused))
-#define SL_BLOCK_ARGUMENTS \\
-  const sl_time *times, const sl_group *restrict x, const sl_group *restrict from, const sl_group *restrict p, \\
-      const sl_group *restrict r, const sl_v *restrict gains, double period, sl_group *restrict next, \\
-      sl_group *restrict at, sl_group (*restrict kept)[SL_NX], sl_group *restrict u, sl_group *restrict e, \\
-      sl_group *restrict sigma, sl_group *restrict wished, sl_group *restrict a_law
-
-typedef int (*sl_block)(SL_BLOCK_ARGUMENTS);
-
 {kernel_update(program.system.tableau, "SL_NX - SL_NZ" if sampled and memory else "SL_NX")}"""
 
 
@@ -104,35 +95,45 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
     slots, size, sampled, options = program.system.slots, program.size, spec.sampled, spec.options
     if options.engine == "casadi":
         sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
-        start = preamble(program, width=1, groups=1, packs=1, sampled=sampled, sizes=sizes)
-        start += f"\n#define SL_BLOCKED 0\nenum {{ SL_BLOCKS = {program.system.tableau.stages}, SL_PER_BLOCK = 1, SL_GAINS = 0 }};\n"
+        start = preamble(program, _ONE_BY_ONE, width=1, sampled=sampled, sizes=sizes)
+        stages = program.system.tableau.stages
+        start += f"\n#define SL_BLOCKED 0\nenum {{ SL_BLOCKS = {stages}, SL_PER_BLOCK = 1, SL_GAINS = 0 }};\n"
         parameters = tuple(slot.key for slot in slots)
         files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}
     else:
         width = options.width or toolchain.native_vector_width(options.compiler)
-        groups = options.groups or int(os.environ.get('GROUPS', 2 if width > 1 else 1))
-        # The plant alone is a short evaluation and a long chain: others have to fill its gaps.
-        packs = options.packs or int(os.environ.get('PACKS', 2 if sampled and width > 1 else 1))
-        emission = lanes.emit(
-            program, spec.constants, groups, sampled=sampled, span=os.environ.get('SPAN','stage'), most=int(os.environ.get('MOST','12'))
-        )
-        start = preamble(program, width=width, groups=groups, packs=packs, sampled=sampled, sizes=emission.sizes)
+
+        def shape(operations: int) -> Shape:
+            best = what_pays(width, sampled, operations)
+            return replace(
+                best,
+                span=options.span or best.span,
+                groups=options.groups or best.groups,
+                packs=options.packs or best.packs,
+            )
+
+        emission = lanes.emit(program, spec.constants)
+        steps = print_steps(emission.values, sampled, shape)
+        start = preamble(program, steps.shape, width=width, sampled=sampled, sizes=emission.sizes)
         parameters = emission.tunable
-        files = {**runtime_sources(), "kernel.h": f"{start}\n#define SL_BLOCKED 1\n{emission.text}"}
+        files = {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}\n{steps.text}"}
     return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)
 
 
 def best_flags(compiler: toolchain.Compiler) -> tuple[str, ...]:
     """Optimisation flags that make the fastest kernel with this compiler on this machine."""
     flags = ("-O3", *toolchain.native_flags(compiler))
-    if compiler.family == "gcc":  # its scheduler before register allocation hides the latencies
-        flags += tuple(os.environ.get("XFLAGS", "-fno-schedule-insns -fno-schedule-insns2 -mtune=generic").split())
+    if compiler.family == "gcc":  # the order of a block is made for the processor: let it stand
+        flags += ("-fno-schedule-insns", "-fno-schedule-insns2", "-mtune=generic")
     return flags
 
 
 def _flags(options: KernelOptions) -> tuple[str, ...]:
     wanted = best_flags(options.compiler or toolchain.find_compiler()) if options.flags is None else options.flags
     return (*wanted, "-std=gnu99", "-fvisibility=hidden", "-Wno-unused-parameter", "-Wno-psabi", "-lm")
+
+
+_ONE_BY_ONE = Shape("evaluation", 1, 1, 0)
 
 
 @lru_cache(maxsize=1)

@@ -11,11 +11,11 @@ from .keywords import KEYWORDS as KEYWORDS
 from .literals import Real as Real
 from .literals import constant_expression as constant_expression
 from .literals import literal as literal
-from .operations import FUNCTIONS as FUNCTIONS
 from .operations import MASKS as MASKS
 from .operations import POWERS as POWERS
 from .operations import SPECIAL_POWERS as SPECIAL_POWERS
 from .operations import formula as formula
+from .operations import function_name as function_name
 from .operations import print_operation as print_operation
 from .stepping import kept_slopes as kept_slopes
 from .stepping import kernel_update as kernel_update

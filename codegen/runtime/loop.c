@@ -281,10 +281,9 @@ static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
 #endif
 
 /* A stage of step k by the complete functions; e, sigma and u become those at the start of the step. */
-static void run_stage(sl_pack *pack, int64_t k, int stage, const sl_group *from, sl_group *to) {
+static void run_stage(sl_pack *pack, int64_t k, int stage, const sl_group *from, sl_group *slope) {
   const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
   const sl_group *at = stage == 0 ? x : from;
-  sl_group once[SL_NX], *slope = sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]];
 #if SL_SAMPLED
   if (stage == 0) sample_control(pack, k, pack->times[0]);
   kernel_plant(pack->times[sl_when[stage]], at, (const sl_group *)pack->u, p, r, slope);
@@ -297,26 +296,27 @@ static void run_stage(sl_pack *pack, int64_t k, int stage, const sl_group *from,
     kernel_closed(pack->times[sl_when[stage]], at, p, r, slope, u, e, sigma, wished, a_law);
   }
 #endif
-  kernel_update(stage, pack->job->step, x, slope, pack->kept, pack->next, to);
 }
 
 /* A block of stages; where a rare case is met, they are computed again by the complete functions. */
 static void run_block(sl_pack *pack, int64_t k, int block) {
-  sl_group *from = pack->at[block & 1], *to = pack->at[(block + 1) & 1];
-  int i;
+  const sl_group *x = (const sl_group *)pack->x;
+  sl_group *from = pack->at[block & 1], *to = pack->at[(block + 1) & 1], once[SL_NX];
+  int stage = block * SL_PER_BLOCK, end = stage + SL_PER_BLOCK, fine = 0, fused = 0;
 #if SL_BLOCKED
-  const double period = (double)pack->job->hold * pack->job->step;
-  sl_block compute = sl_blocks[block];
-#if SL_SAMPLED
-  if (block == 0 && k % pack->job->hold != 0) compute = sl_held;
+  const sl_block *chosen = SL_SAMPLED && block == 0 && k % pack->job->hold != 0 ? &SL_HELD : &sl_blocks[block];
+  sl_group *slope = sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]];
+  fused = SL_FUSED;
+  fine = chosen->compute(pack->times + chosen->instant, (const sl_v *)pack->gains + chosen->gain,
+                         (double)pack->job->hold * pack->job->step, (const sl_group *)pack->p,
+                         (const sl_group *)pack->r, x, (const sl_group *)from, pack->next, to, pack->kept, slope,
+                         pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
 #endif
-  if (!SL_LIKELY(compute(pack->times, (const sl_group *)pack->x, (const sl_group *)from, (const sl_group *)pack->p,
-                         (const sl_group *)pack->r, (const sl_v *)pack->gains, period, pack->next, to, pack->kept,
-                         pack->u, pack->e, pack->sigma, pack->wished, pack->a_law)))
-#endif
-  {
-    for (i = 0; i < SL_PER_BLOCK; i++) {
-      run_stage(pack, k, block * SL_PER_BLOCK + i, i == 0 ? (const sl_group *)from : (const sl_group *)to, to);
+  if (!SL_LIKELY(fine && fused)) {
+    for (; stage < end; stage++, from = to) {
+      sl_group *slope = sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]];
+      if (!fine) run_stage(pack, k, stage, (const sl_group *)from, slope);
+      kernel_update(stage, pack->job->step, x, slope, pack->kept, pack->next, to);
     }
   }
   if (block == 0) observe(pack, k, pack->times[0]);
