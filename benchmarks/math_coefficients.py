@@ -155,7 +155,7 @@ def polynomials() -> tuple[Polynomial, ...]:
 
 START = Polynomial(
     "CUBE_ROOT_START",
-    "a, b, c, k: k (u + a) (u^2 + b u + c) ~ u^(-1/3), 2.6653 <= u <= 3.1590",
+    "a, b, c, k: k (u - a) (u (u - b) + c) ~ u^(-1/3), 2.6653 <= u <= 3.1590",
     lambda u: u ** (-mp.mpf(1) / 3),
     lambda u: u ** (mp.mpf(1) / 3),
     mp.mpf("2.6653"),
@@ -183,9 +183,7 @@ def best(polynomial: Polynomial, known: list[Real]) -> list[Real]:
             matrix[row, n], right[row] = (-1) ** row / weight[i], wanted[i]
         solution = mp.lu_solve(matrix, right)
         coefficients = [solution[k] for k in range(n)]
-        error = [
-            w * (f - mp.polyval(coefficients[::-1], each)) for w, f, each in zip(weight, wanted, x, strict=True)
-        ]
+        error = [w * (f - mp.polyval(coefficients[::-1], each)) for w, f, each in zip(weight, wanted, x, strict=True)]
         # One exchange after the other makes the error at the chosen points grow, so that they end.
         if max(map(abs, error)) <= abs(solution[n]) * (1 + mp.mpf(2) ** -40):
             return coefficients
@@ -218,7 +216,7 @@ def coefficients(polynomial: Polynomial) -> tuple[float, ...]:
         roots = mp.polyroots(best(polynomial, [])[::-1], maxsteps=200, extraprec=PRECISION)
         (real,) = (root for root in roots if mp.im(root) == 0)
         pair = next(root for root in roots if mp.im(root) > 0)
-        return float(-real), float(-2 * mp.re(pair)), float(abs(pair) ** 2), found[-1]
+        return float(real), float(2 * mp.re(pair)), float(abs(pair) ** 2), found[-1]
 
 
 def module() -> str:

@@ -28,7 +28,7 @@ def _steps(masks: tuple[Word, Word, Word, Word], values: tuple[float, float, flo
     return chosen
 
 
-def _angle(y: Word, x: Word) -> Word:
+def _angle(y: Word, x: Word | float) -> Word:
     """The angle in [0, pi/2] whose tangent is y / x, both positive.
 
     atan c + atan t with c = 0, 1/2, 1, 3/2 or infinite, c = b / a and t = (a y - b x) / (a x + b y), |t| <= 7/16.
@@ -37,8 +37,9 @@ def _angle(y: Word, x: Word) -> Word:
     m2 = named("m2", y >= 0.6875 * x)
     m3 = named("m3", y >= 1.1875 * x)
     m4 = named("m4", y >= 2.4375 * x)
-    a = named("a", select(m4, constant(0.0), select(m2, constant(1.0), 1.0 + true(m1))))
-    b = named("b", select(m4, constant(1.0), select(m3, constant(1.5), true(m1))))
+    first = named("first", true(m1))
+    a = named("a", select(m4, constant(0.0), select(m2, constant(1.0), 1.0 + first)))
+    b = named("b", select(m4, constant(1.0), select(m3, constant(1.5), first)))
     hi = named("hi", _steps((m1, m2, m3, m4), (ATAN_1_2, QUARTER_PI, ATAN_3_2, HALF_PI)))
     lo = named("lo", _steps((m1, m2, m3, m4), (ATAN_1_2_LO, QUARTER_PI_LO, ATAN_3_2_LO, HALF_PI_LO)))
     t = named("t", (a * y - b * x) / (a * x + b * y))
@@ -60,7 +61,7 @@ def angle(y: Word, x: Word) -> Computed:
 
 def atan(x: Word) -> Computed:
     """The angle of x to 1."""
-    return (with_sign(_angle(named("y", fmin(constant(2.0**1000), absolute(x))), constant(1.0)), x),), None
+    return (with_sign(_angle(named("y", fmin(constant(2.0**1000), absolute(x))), 1.0), x),), None
 
 
 def atan2(y: Word, x: Word) -> Computed:
@@ -101,7 +102,7 @@ def asin(x: Word) -> Computed:
     p = named("p", (2.0 * s) * tail - (HALF_PI_LO - 2.0 * sl))
     q = named("q", QUARTER_PI - 2.0 * sh)
     large = named("large", QUARTER_PI - (p - q))
-    return (with_sign(select(small, a + a * tail, large), x),), None
+    return (with_sign(named("size", select(small, a + a * tail, large)), x),), None
 
 
 def acos(x: Word) -> Computed:

@@ -117,10 +117,10 @@ MINUS_TWO_THIRDS = (
     float.fromhex("0x1.555555555bcf7p-1"),
     float.fromhex("0x1.1c71c71c79b04p-1"),
 )
-# a, b, c, k: k (u + a) (u^2 + b u + c) ~ u^(-1/3), 2.6653 <= u <= 3.1590
+# a, b, c, k: k (u - a) (u (u - b) + c) ~ u^(-1/3), 2.6653 <= u <= 3.1590
 CUBE_ROOT_START = (
-    float.fromhex("-0x1.0ccf36b58beaep+3"),
-    float.fromhex("-0x1.04a1a00bc1e04p+2"),
+    float.fromhex("0x1.0ccf36b58beaep+3"),
+    float.fromhex("0x1.04a1a00bc1e04p+2"),
     float.fromhex("0x1.d3cf10e73aa3cp+4"),
     float.fromhex("-0x1.435e87cb87d78p-8"),
 )

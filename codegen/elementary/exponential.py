@@ -102,16 +102,17 @@ def sinh(x: Word) -> Computed:
     q = named("q", e / u)
     v = named("v", 1.0 - q)
     rest = named("rest", lo * (1.0 + v * v) - (q * v) * (e - (u - 1.0)))
-    return (with_sign(0.5 * (e + (q + rest)), x),), a < LARGEST
+    return (with_sign(named("size", 0.5 * (e + (q + rest))), x),), a < LARGEST
 
 
 def tanh(x: Word) -> Computed:
     """With e + lo = exp(2|x|) - 1: e / (2 + e), mended likewise, or 1 - 2 / (2 + e); 1 to the last bit from 30 on."""
     a = named("a", absolute(x))
-    e, lo = _less_one_twice(2.0 * fmin(constant(30.0), a))
+    e, lo = _less_one_twice(named("twice", 2.0 * fmin(constant(30.0), a)))
     u = named("u", 2.0 + e)
     small = named("is_small", a < 0.55)
     q = named("q", select(small, e, constant(2.0)) / u)
-    v = named("v", 0.5 * (1.0 - q))
+    other = named("other", 1.0 - q)
+    v = named("v", 0.5 * other)
     rest = named("rest", v * ((2.0 * v) * lo - q * (e - (u - 2.0))))
-    return (with_sign(select(small, q + rest, 1.0 - q), x),), None
+    return (with_sign(named("size", select(small, q + rest, other)), x),), None

@@ -14,6 +14,7 @@ from springline.codegen.elementary.words import Procedure, trace
 
 FUNCTIONS: dict[str, tuple[Callable[..., Computed], int]] = {
     "fabs": (primitives.fabs, 1),
+    "sq": (primitives.sq, 1),
     "copysign": (primitives.copysign, 2),
     "sign": (primitives.sign, 1),
     "floor": (primitives.floor, 1),

@@ -90,6 +90,6 @@ def pow_(x: Word, y: Word) -> Computed:
     return (r,), fine & ~(below(low, 1) | below(low ^ ALTERNATING, 1))
 
 
-def pow_log(shifted: Word, y: Word, bias: Word) -> Computed:
-    """The logarithm alone, for x that was scaled; of `shifted` the bits are meant."""
-    return _log(bits(shifted), y, bias), None
+def pow_log(x: Word, y: Word, bias: Word) -> Computed:
+    """The logarithm alone, for x that was scaled."""
+    return _log(named("shifted", bits(x) - START), y, bias), None

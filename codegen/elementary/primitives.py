@@ -66,8 +66,14 @@ def sign(x: Word) -> Computed:
     return (select(x > 0.0, constant(1.0), select(x < 0.0, constant(-1.0), x)),), None
 
 
+def sq(x: Word) -> Computed:
+    """The square."""
+    return (x * x,), None
+
+
 def _nearest(x: Word) -> Word:
     """x + 2^52 - 2^52 rounds |x| < 2^52 to the nearest integer."""
+    named("sign", bits(x) & SIGN_BIT)
     shift = named("shift", with_sign(constant(2.0**52), x))
     return named("nearest", (x + shift) - shift)
 

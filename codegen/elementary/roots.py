@@ -27,10 +27,11 @@ def _start(x: Word) -> tuple[Word, Word]:
     """y with a relative error of 1e-6, and where all this holds. The polynomial in factors: real ones are short."""
     a, b, c, scale = CUBE_ROOT_START
     t = named("t", real((bits(x) >> 20) | 0x4330000000000000))
-    y = named("y0", real(bits(START - t * THIRD) << 20))
+    divided = named("divided", START - t * THIRD)
+    y = named("y0", real(bits(divided) << 20))
     u = named("u", (x * y) * (y * y))
     fine = below(bits(x) - SMALLEST_THIRDS, RANGE_THIRDS)
-    return named("y", ((y * scale) * (u + a)) * (u * (u + b) + c)), fine
+    return named("y", ((y * scale) * (u - a)) * (u * (u - b) + c)), fine
 
 
 def _step(z: Word, h: Word, c: tuple[float, ...]) -> Word:
@@ -72,7 +73,7 @@ def pow_p2_3(x: Word) -> Computed:
 def cbrt(x: Word) -> Computed:
     """Of |x|, with the sign of x."""
     (r,), fine = pow_p1_3(named("a", absolute(x)))
-    return (with_sign(r, x),), fine
+    return (with_sign(named("root", r), x),), fine
 
 
 def hypot(x: Word, y: Word) -> Computed:

@@ -185,6 +185,8 @@ class Word:
 
 def operation(op: Op, *operands: Word | float) -> Word:
     """The Word of an operation; a number becomes a constant of the kind that the other operands have."""
+    if op is Op.MUL and 1.0 in operands:
+        return next(operand for operand in operands if isinstance(operand, Word))
     kind = Kind.BITS if op.name.startswith("BIT_") else Kind.REAL
     words = [operand if isinstance(operand, Word) else constant(operand, kind) for operand in operands]
     return _CURRENT.get().word(op, [word.place for word in words])
