@@ -55,16 +55,28 @@ def polynomials() -> tuple[Polynomial, ...]:
     def own_share(s: Real) -> Real:
         return s**3 / (2 * mp.atanh(s))
 
+    def exponential(r: Real) -> Real:
+        return (mp.expm1(r) - r) / r**2
+
     half_ln2 = ln2 / 2 * (1 + MARGIN)
     return (
         Polynomial(
-            "EXP",
+            "EXPM1",
             "(e^r - 1 - r) / r^2, |r| <= ln 2 / 2",
-            lambda r: (mp.expm1(r) - r) / r**2,
+            exponential,
             lambda r: r**2 / mp.exp(r),
             -half_ln2,
             half_ln2,
             10,
+        ),
+        Polynomial(
+            "EXP",
+            "the same, |r| <= ln 2 / 4",
+            exponential,
+            lambda r: r**2 / mp.exp(r),
+            -half_ln2 / 2,
+            half_ln2 / 2,
+            8,
         ),
         Polynomial(
             "LOG",
@@ -109,7 +121,7 @@ def polynomials() -> tuple[Polynomial, ...]:
             of_square(lambda r: r**3 / mp.tan(r)),
             0,
             quarter_pi**2 * square,
-            15,
+            14,
         ),
         Polynomial(
             "ATAN",

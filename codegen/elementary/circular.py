@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from springline.codegen.elementary.coefficients import COS, SIN, TAN
-from springline.codegen.elementary.primitives import ROUND, SIGN_BIT, Computed, absolute, cut, hexadecimal
-from springline.codegen.elementary.words import Word, bits, equal, named, pick, real, select
+from springline.codegen.elementary.primitives import ROUND, SIGN_BIT, Computed, absolute, hexadecimal
+from springline.codegen.elementary.words import Word, bits, named, pick, real
 
 # pi/2 in two pieces of 36 bits and a double: n times a piece is exact.
 HALF_PI_1 = hexadecimal("0x1.921fb54440000p+0")
@@ -61,8 +61,8 @@ def sincos_reduced(r: Word, lo: Word, t: Word) -> Computed:
     return _sincos(r, -lo, t), None
 
 
-def _tan(r: Word, y: Word, t: Word) -> Word:
-    """tan r = r + r^3 T(r^2); in odd quarters -1 / tan r, divided with the remainder carried along."""
+def _tan(r: Word, rest: Word, t: Word) -> Word:
+    """tan r = r + r^3 T(r^2), at r - rest; in odd quarters -1 / tan r, what the tangent cannot hold carried along."""
     c = TAN
     z = named("z", r * r)
     w = named("w", z * z)
@@ -70,28 +70,25 @@ def _tan(r: Word, y: Word, t: Word) -> Word:
     p03 = named("p03", (c[0] + z * c[1]) + w * (c[2] + z * c[3]))
     p47 = named("p47", (c[4] + z * c[5]) + w * (c[6] + z * c[7]))
     p8b = named("p8b", (c[8] + z * c[9]) + w * (c[10] + z * c[11]))
-    pce = named("pce", (c[12] + z * c[13]) + w * c[14])
-    p = named("p", p03 + w2 * (p47 + w2 * (p8b + w2 * pce)))
+    pcd = named("pcd", c[12] + z * c[13])
+    p = named("p", p03 + w2 * (p47 + w2 * (p8b + w2 * pcd)))
     u = named("u", (r * z) * p)
     first = named("first", r + u)
-    u = named("v", u + y * (1.0 + first * first))
-    tangent = named("tangent", r + u)
-    lo = named("lo", u - (tangent - r))
-    th = named("th", cut(tangent))
+    v = named("v", u - rest * (1.0 + first * first))
+    tangent = named("tangent", r + v)
+    lo = named("lo", v - (tangent - r))
     q = named("q", -1.0 / tangent)
-    qh = named("qh", cut(q))
-    inverse = named("inverse", qh + q * ((1.0 + qh * th) + qh * ((tangent - th) + lo)))
-    return pick(bits(t) << 63, tangent, inverse)
+    return pick(bits(t) << 63, tangent, named("inverse", q + (q * q) * lo))
 
 
 def tan(x: Word) -> Computed:
-    """-0 for -0."""
+    """r without its rounding error."""
     t, n, a, b = _quarters(x)
     r = named("r", a - b)
-    y = named("y", ((a - r) - b) - n * HALF_PI_3)
-    return (select(equal(x, 0.0), x, _tan(r, y, t)),), absolute(x) < LARGEST
+    rest = named("rest", n * HALF_PI_3 - ((a - r) - b))
+    return (_tan(r, rest, t),), absolute(x) < LARGEST
 
 
 def tan_reduced(r: Word, lo: Word, t: Word) -> Computed:
     """Tangent of r + lo in the quarter that the low bits of t tell."""
-    return (_tan(r, lo, t),), None
+    return (_tan(r, -lo, t),), None

@@ -1,7 +1,7 @@
 """Polynomials of the elementary functions, as benchmarks/math_coefficients.py computes them."""
 
 # (e^r - 1 - r) / r^2, |r| <= ln 2 / 2
-EXP = (
+EXPM1 = (
     float.fromhex("0x1.000000000000ap-1"),
     float.fromhex("0x1.55555555554fap-3"),
     float.fromhex("0x1.555555555088ap-5"),
@@ -12,6 +12,17 @@ EXP = (
     float.fromhex("0x1.71df2506b09b6p-19"),
     float.fromhex("0x1.28ad67a46807dp-22"),
     float.fromhex("0x1.ad7fc465e629dp-26"),
+)
+# the same, |r| <= ln 2 / 4
+EXP = (
+    float.fromhex("0x1.ffffffffffefcp-2"),
+    float.fromhex("0x1.555555555589dp-3"),
+    float.fromhex("0x1.5555555600160p-5"),
+    float.fromhex("0x1.1111110f0d41ep-7"),
+    float.fromhex("0x1.6c16b8dcec34bp-10"),
+    float.fromhex("0x1.a01a1826fbb53p-13"),
+    float.fromhex("0x1.a06fe78c68969p-16"),
+    float.fromhex("0x1.71a9f807860fep-19"),
 )
 # (2 atanh(s) / s - 2) / z of z = s^2, s <= (sqrt 2 - 1)^2
 LOG = (
@@ -53,21 +64,20 @@ COS = (
 )
 # (tan r - r) / r^3 of z = r^2, r <= pi / 4
 TAN = (
-    float.fromhex("0x1.555555555555dp-2"),
-    float.fromhex("0x1.11111111106ddp-3"),
-    float.fromhex("0x1.ba1ba1bab239ap-5"),
-    float.fromhex("0x1.664f485fc5355p-6"),
-    float.fromhex("0x1.226e3a2f9572ap-7"),
-    float.fromhex("0x1.d6d2f4b18c0c6p-9"),
-    float.fromhex("0x1.7db0d9642d83fp-10"),
-    float.fromhex("0x1.34c31799a3355p-11"),
-    float.fromhex("0x1.fecbcb0b8b1f9p-13"),
-    float.fromhex("0x1.606efe238b6d3p-14"),
-    float.fromhex("0x1.1666d77878893p-14"),
-    float.fromhex("-0x1.9c37453d0afccp-16"),
-    float.fromhex("0x1.9092003b2c3d6p-15"),
-    float.fromhex("-0x1.8fecf752d2831p-16"),
-    float.fromhex("0x1.458cebe2b4cffp-17"),
+    float.fromhex("0x1.55555555554f2p-2"),
+    float.fromhex("0x1.11111111182c9p-3"),
+    float.fromhex("0x1.ba1ba1b46be95p-5"),
+    float.fromhex("0x1.664f49a85a480p-6"),
+    float.fromhex("0x1.226e125c18b3fp-7"),
+    float.fromhex("0x1.d6d933881d934p-9"),
+    float.fromhex("0x1.7d5b5e6ff45aap-10"),
+    float.fromhex("0x1.37fa7e070f8a4p-11"),
+    float.fromhex("0x1.d2714bfc9fed7p-13"),
+    float.fromhex("0x1.1e282527e334bp-13"),
+    float.fromhex("-0x1.b8eede5990f4ep-16"),
+    float.fromhex("0x1.76cae235549b2p-14"),
+    float.fromhex("-0x1.7806da6d76e2ap-15"),
+    float.fromhex("0x1.5dd31c74861afp-16"),
 )
 # (atan t - t) / t^3 of z = t^2, t <= 7 / 16
 ATAN = (

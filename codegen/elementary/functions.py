@@ -6,7 +6,7 @@ What lies outside is a scalar function sl_<name>_rare in sl_math.h. Special valu
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
 
 from springline.codegen.elementary import arcs, circular, exponential, logarithm, power, primitives, roots
 from springline.codegen.elementary.primitives import Computed
@@ -52,7 +52,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Computed], int]] = {
 """Name without prefix -> the function, and how many arguments it has."""
 
 
-@lru_cache(maxsize=None)
+@cache
 def procedure(name: str) -> Procedure:
     """The steps of an elementary function."""
     function, inputs = FUNCTIONS[name]
