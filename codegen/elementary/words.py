@@ -8,9 +8,9 @@ regroups anything, so they all compute the same bits.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 
@@ -86,12 +86,14 @@ class Procedure:
     results  the steps that are its results
     fine     the step, a mask, that tells where they hold; None if everywhere
     inputs   how many
+    names    what a reader calls a step
     """
 
     steps: tuple[Step, ...]
     results: tuple[int, ...]
     fine: int | None
     inputs: int
+    names: Mapping[int, str] = field(default_factory=dict, compare=False)
 
     @property
     def needed(self) -> tuple[int, ...]:
@@ -109,6 +111,7 @@ class Procedure:
 class _Trace:
     def __init__(self) -> None:
         self.steps: list[Step] = []
+        self.names: dict[int, str] = {}
         self._places: dict[object, int] = {}
 
     def word(self, op: Op, arguments: Sequence[int] = (), number: float | int = 0) -> Word:
@@ -195,17 +198,24 @@ class Word:
 
 def operation(op: Op, *operands: Word | float) -> Word:
     """The Word of an operation; a number becomes a constant of the kind that the other operands have."""
-    kinds = [operand.kind for operand in operands if isinstance(operand, Word)]
-    kind = Kind.BITS if kinds and all(k is Kind.BITS for k in kinds) else Kind.REAL
+    if op is Op.MUL and 1.0 in operands:
+        return next(operand for operand in operands if isinstance(operand, Word))
+    kind = Kind.BITS if op.name.startswith("BIT_") else Kind.REAL
     words = [operand if isinstance(operand, Word) else constant(operand, kind) for operand in operands]
     return _CURRENT.get().word(op, [word.place for word in words])
+
+
+def named(name: str, word: Word) -> Word:
+    """A Word that a reader knows by a name: it is printed as a statement of its own."""
+    _CURRENT.get().names.setdefault(word.place, name)
+    return word
 
 
 def constant(value: float, kind: Kind = Kind.REAL) -> Word:
     """The Word of a number."""
     if kind is Kind.BITS:
         assert isinstance(value, int)
-        return _CURRENT.get().word(Op.BITS_CONSTANT, (), value)
+        return _CURRENT.get().word(Op.BITS_CONSTANT, (), value % 2**64)
     return _CURRENT.get().word(Op.REAL_CONSTANT, (), float(value))
 
 
@@ -224,9 +234,39 @@ def sqrt(x: Word) -> Word:
     return operation(Op.SQRT, x)
 
 
+def equal(a: Word, b: Word | float) -> Word:
+    """Whether two real numbers are equal."""
+    return operation(Op.EQ, a, b)
+
+
+def not_equal(a: Word, b: Word | float) -> Word:
+    """Whether two real numbers differ."""
+    return operation(Op.NE, a, b)
+
+
 def select(mask: Word, a: Word | float, b: Word | float) -> Word:
     """a where the mask holds, else b."""
     return operation(Op.SELECT, mask, a, b)
+
+
+def if_(mask: Word, a: Word | float) -> Word:
+    """a where the mask holds, else 0.0."""
+    return operation(Op.IF, mask, a)
+
+
+def true(mask: Word) -> Word:
+    """1.0 where the mask holds, else 0.0."""
+    return operation(Op.TRUE, mask)
+
+
+def fmin(a: Word | float, b: Word | float) -> Word:
+    """a < b ? a : b."""
+    return operation(Op.FMIN, a, b)
+
+
+def fmax(a: Word | float, b: Word | float) -> Word:
+    """a > b ? a : b."""
+    return operation(Op.FMAX, a, b)
 
 
 def pick(at: Word, a: Word | float, b: Word | float) -> Word:
@@ -249,5 +289,9 @@ def trace(function: Callable[..., tuple[tuple[Word, ...], Word | None]], inputs:
     finally:
         _CURRENT.reset(token)
     return Procedure(
-        tuple(current.steps), tuple(r.place for r in results), None if fine is None else fine.place, inputs
+        tuple(current.steps),
+        tuple(r.place for r in results),
+        None if fine is None else fine.place,
+        inputs,
+        current.names,
     )

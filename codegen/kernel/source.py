@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import resources
 
+from springline.codegen.elementary import math_header
 from springline.codegen.kernel import lanes, toolchain
 from springline.codegen.kernel.job import job_header
 from springline.codegen.kernel.paying import Shape, what_pays
@@ -17,7 +18,7 @@ from springline.codegen.kernel.steps import print_steps
 from springline.codegen.program import Program, casadi_c, kernel_update
 from springline.model.quantities import METRICS, entries
 
-_RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
+_RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_lanes.h", "sl_casadi.h")
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,4 +141,5 @@ _ONE_BY_ONE = Shape("evaluation", 1, 1, 0)
 def runtime_sources() -> dict[str, str]:
     """The C that all kernels share, by file name."""
     folder = resources.files("springline.codegen") / "runtime"
-    return {"simulate.h": job_header(), **{name: (folder / name).read_text() for name in _RUNTIME}}
+    files = {"simulate.h": job_header(), "sl_math.h": math_header()}
+    return {**files, **{name: (folder / name).read_text() for name in _RUNTIME}}
