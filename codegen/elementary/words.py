@@ -57,7 +57,6 @@ class Op(Enum):
     AND = ("and", Kind.MASK)
     OR = ("or", Kind.MASK)
     NOT = ("not", Kind.MASK)
-    CALL = ("call", Kind.REAL)  # of a function that has no program
 
     @property
     def kind(self) -> Kind:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from springline.codegen.elementary import COMMUTATIVE, FUNCTIONS, Kind, Op, Procedure, procedure
+from springline.codegen.elementary import COMMUTATIVE, Kind, Op, Procedure, procedure
 from springline.codegen.kernel.loop_values import LoopValues
 from springline.codegen.program import POWERS, SPECIAL_POWERS, Binding, function_name
 
@@ -38,7 +38,7 @@ class Primitive:
     """An operation of a block on earlier ones.
 
     number  of a constant, a shift, a bound
-    text    of what is loaded, its C expression;  of a call, the function's name
+    text    of what is loaded, its C expression
     """
 
     op: Op
@@ -179,9 +179,7 @@ class Expansion:
             exponent = self._exponent(node.arguments[1], values[1])
             if exponent is not None:
                 name, values = f"pow_{SPECIAL_POWERS[exponent]}", values[:1]
-        if name in FUNCTIONS:
-            return block.elementary(procedure(name), values)[0]
-        return block.add(Op.CALL, *values, text=name)
+        return block.elementary(procedure(name), values)[0]
 
     def _exponent(self, power: int, place: int) -> float | None:
         """The special exponent that a power has, or is taken to have."""

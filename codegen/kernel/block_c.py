@@ -8,12 +8,6 @@ from springline.codegen.elementary import Kind, Op
 from springline.codegen.kernel.block import Block, Primitive
 from springline.codegen.program import literal
 
-# Functions of sl_lanes.h without a program whose fast path tells where it holds.
-_FAST = frozenset({
-    "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "hypot", "pow", "sinh", "cosh", "atan2",
-    *(f"pow_{power}" for power in ("p1_3", "m1_3", "p2_3", "m2_3", "p1_2", "m1_2", "p3_2")),
-})  # fmt: skip
-
 _TYPES = {Kind.REAL: "sl_v", Kind.BITS: "sl_b", Kind.MASK: "sl_m"}
 _INFIX = {
     Op.ADD: "+",
@@ -69,7 +63,7 @@ def statements(block: Block, order: Sequence[int], groups: int, indent: str) -> 
     for i in order:
         for g in range(groups):
             operands = [value(k, g) for k in nodes[i].arguments]
-            expression = _expression(nodes[i], operands, f"ok{suffix(g)}")
+            expression = _expression(nodes[i], operands)
             lines.append(f"{indent}const {_TYPES[nodes[i].op.kind]} {value(i, g)} = {expression};")
             if i in fine:
                 lines.append(f"{indent}ok{suffix(g)} = ok{suffix(g)} & {value(i, g)};")
@@ -79,7 +73,7 @@ def statements(block: Block, order: Sequence[int], groups: int, indent: str) -> 
     return lines
 
 
-def _expression(node: Primitive, operands: Sequence[str], ok: str) -> str:
+def _expression(node: Primitive, operands: Sequence[str]) -> str:
     if node.op in (Op.SHIFT_LEFT, Op.SHIFT_RIGHT):
         return f"{operands[0]} {_INFIX[node.op]} {int(node.number)}"
     if node.op in _INFIX:
@@ -88,8 +82,4 @@ def _expression(node: Primitive, operands: Sequence[str], ok: str) -> str:
         return f"-{operands[0]}"
     if node.op is Op.BELOW:
         return f"slv_below({operands[0]}, UINT64_C({int(node.number):#x}))"
-    if node.op is Op.CALL:
-        if node.text in _FAST:
-            return f"slv_{node.text}_fast({', '.join([*operands, f'&{ok}'])})"
-        return f"slv_{node.text}({', '.join(operands)})"
     return f"slv_{node.op.value[0]}({', '.join(operands)})"

@@ -19,7 +19,7 @@ LEAVES = frozenset({Op.INPUT, Op.REAL_CONSTANT, Op.BITS_CONSTANT, Op.REAL, Op.BI
 
 _MULTIPLIER, _ADDER, _SHUFFLER, _LOGIC = range(4)
 _PORTS = {
-    **dict.fromkeys((Op.MUL, Op.DIV, Op.SQRT, Op.CALL), _MULTIPLIER),
+    **dict.fromkeys((Op.MUL, Op.DIV, Op.SQRT), _MULTIPLIER),
     **dict.fromkeys((Op.ADD, Op.SUB, Op.FMIN, Op.FMAX, Op.LT, Op.LE, Op.EQ, Op.NE, Op.BELOW), _ADDER),
     **dict.fromkeys((Op.SHIFT_LEFT, Op.SHIFT_RIGHT), _SHUFFLER),
 }
@@ -28,7 +28,6 @@ _LATENCY = {
     **dict.fromkeys((Op.LT, Op.LE, Op.EQ, Op.NE, Op.BELOW), 2),
     Op.DIV: 13,
     Op.SQRT: 20,
-    Op.CALL: 60,
 }
 _SLOTS = 4
 _PER_PORT = 2
