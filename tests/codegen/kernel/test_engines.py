@@ -276,15 +276,13 @@ def test_the_kernel_is_written_for_a_reader(shaken: Program, values_of: Values) 
         "once per time",
         "at every evaluation",
         "operations a run",
-        "e_lift_0",
-        "sigma_rotation_1",
         "sin_q1_rotation",
         "const sl_v control_delta = p[0][g]",
         "/* sq(control_delta) */",
-        "slv_sincos_fast",
-        "const sl_v de_lift_0 = dq1d_lift_0 - dq1_lift_0;",
-        "const sl_v u_e_rotation_1 = ",
-        "const sl_v z_lift_1 = slv_set(2000000.0) * a",
+        "slv_sincos(q1_rotation, &sin_q1_rotation, &cos_q1_rotation);",
+        "const sl_v de_lift = dq1d_lift - dq1_lift;",
+        "const sl_v u_e_rotation = ",
+        "const sl_v z_lift = slv_set(2000000.0) * a",
     ):
         assert text in emission.text, text
     assert emission.tunable == ("control.delta",)
