@@ -15,7 +15,6 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
+from springline.codegen.elementary import math_header
 from springline.codegen.kernel import toolchain
 from springline.runner.report import put
 
@@ -211,14 +211,13 @@ PAIRS = ("pow", "hypot", "atan2")
 
 def library() -> ctypes.CDLL:
     """array_<name>(x, y, r, n) for every function of CASES, compiled from sl_math.h."""
-    header = (resources.files("springline.codegen") / "runtime" / "sl_math.h").read_text()
     lines = ['#include "sl_math.h"']
     for name in sorted({case.function for case in CASES}):
         call = f"sl_{name}(x[i], y[i])" if name in PAIRS else f"sl_{name}(x[i])"
         lines.append(f"void array_{name}(const double *x, const double *y, double *r, int n);")
         lines.append(f"void array_{name}(const double *x, const double *y, double *r, int n) {{")
         lines.append(f"  for (int i = 0; i < n; i++) r[i] = {call};\n  (void)y;\n}}")
-    sources = {"sl_math.h": header, "math_accuracy.c": "\n".join(lines) + "\n"}
+    sources = {"sl_math.h": math_header(), "math_accuracy.c": "\n".join(lines) + "\n"}
     return toolchain.load(toolchain.build_library(sources, main="math_accuracy.c"))
 
 

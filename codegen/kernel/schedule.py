@@ -1,56 +1,129 @@
-"""In which order the statements of a kernel stand: long chains begin early, so that short ones fill their waiting."""
+"""In which order the operations of a block stand: by cycles of an imagined processor, with few values alive at once.
+
+Compilers see a block of thousands of operations through a small window, and so does the processor. The order is made
+here, therefore, and the compiler is told to leave it.
+"""
 
 from __future__ import annotations
 
 import heapq
+from bisect import insort
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-import casadi as ca
+from springline.codegen.elementary import Op
+from springline.codegen.kernel.block import Block
 
-from springline.codegen.program import Node
+LEAVES = frozenset({Op.INPUT, Op.REAL_CONSTANT, Op.BITS_CONSTANT, Op.REAL, Op.BITS})
+"""What costs nothing where it stands: operands from memory, and other names of the same bits."""
 
-# Rough latencies in cycles: they only decide the order of statements.
-_LATENCY = {
-    ca.OP_DIV: 13,
-    ca.OP_INV: 13,
-    ca.OP_SQRT: 20,
-    ca.OP_EXP: 45,
-    ca.OP_LOG: 55,
-    ca.OP_LOG1P: 60,
-    ca.OP_EXPM1: 60,
-    ca.OP_SIN: 45,
-    ca.OP_COS: 45,
-    ca.OP_TAN: 60,
-    ca.OP_POW: 110,
-    ca.OP_CONSTPOW: 60,
-    ca.OP_HYPOT: 40,
+_MULTIPLIER, _ADDER, _SHUFFLER, _LOGIC = range(4)
+_PORTS = {
+    **dict.fromkeys((Op.MUL, Op.DIV, Op.SQRT), _MULTIPLIER),
+    **dict.fromkeys((Op.ADD, Op.SUB, Op.FMIN, Op.FMAX, Op.LT, Op.LE, Op.EQ, Op.NE, Op.BELOW), _ADDER),
+    **dict.fromkeys((Op.SHIFT_LEFT, Op.SHIFT_RIGHT), _SHUFFLER),
 }
-_SIMPLE_LATENCY = 3
+_LATENCY = {
+    **dict.fromkeys((Op.MUL, Op.ADD, Op.SUB), 3),
+    **dict.fromkeys((Op.LT, Op.LE, Op.EQ, Op.NE, Op.BELOW), 2),
+    Op.DIV: 13,
+    Op.SQRT: 20,
+}
+_SLOTS = 4
+_PER_PORT = 2
 
 
-def longest_chain_first(nodes: Sequence[Node], needed: Sequence[int]) -> list[int]:
-    """`needed`, indices of nodes, in topological order: first what most follows on."""
-    inside = set(needed)
+@dataclass(frozen=True, slots=True)
+class Order:
+    """Places of a block's operations in order, and how many values are alive at most."""
+
+    places: tuple[int, ...]
+    alive: int
+
+
+def scheduled(block: Block, most: int) -> Order:
+    """Order the operations of a block: those first that most follows on, as far as their operands are there by then.
+
+    most  values alive from which on operations are preferred that end lives
+    """
+    nodes = block.nodes
+    alias = _aliases(block)
+    operands = [sorted({alias[a] for a in node.arguments} - {-1}) for node in nodes]
+    needed = _needed([*(place for _, place in block.stores), *block.fine], alias, operands)
     users: dict[int, list[int]] = {i: [] for i in needed}
-    waiting = {}
     for i in needed:
-        arguments = {a for a in nodes[i].arguments if a in inside}
-        waiting[i] = len(arguments)
-        for a in arguments:
+        for a in operands[i]:
             users[a].append(i)
-    height: dict[int, int] = {}
+    latency = {i: _LATENCY.get(nodes[i].op, 1) for i in needed}
+    rank: dict[int, int] = {}  # less is sooner: minus the longest way to the end
     for i in reversed(needed):
-        op = nodes[i].op
-        own = _LATENCY.get(op if op is not None else -1, _SIMPLE_LATENCY)
-        height[i] = own + max((height[user] for user in users[i]), default=0)
-    ready = [(-height[i], i) for i in needed if waiting[i] == 0]
-    heapq.heapify(ready)
-    order = []
-    while ready:
-        _, i = heapq.heappop(ready)
-        order.append(i)
-        for user in users[i]:
-            waiting[user] -= 1
-            if waiting[user] == 0:
-                heapq.heappush(ready, (-height[user], user))
-    return order
+        rank[i] = min((rank[user] for user in users[i]), default=0) - latency[i]
+
+    waiting = {i: len(operands[i]) for i in needed}
+    uses = {i: len(users[i]) for i in needed}
+    ready = sorted((rank[i], i) for i in needed if waiting[i] == 0)
+    coming: list[tuple[int, int]] = []  # (cycle, place): what becomes ready then
+    there = dict.fromkeys(needed, 0)  # the cycle in which its operands are
+    order: list[int] = []
+    cycle = alive = peak = 0
+    while ready or coming:
+        while coming and coming[0][0] <= cycle:
+            _, i = heapq.heappop(coming)
+            insort(ready, (rank[i], i))
+        free = [_PER_PORT, _PER_PORT, _PER_PORT, _SLOTS]
+        for _ in range(_SLOTS):
+            narrow = alive >= most
+            found, least = -1, 1 if narrow else 2
+            for k, (_, i) in enumerate(ready):
+                if free[_PORTS.get(nodes[i].op, _LOGIC)] == 0:
+                    continue
+                if not narrow:
+                    found = k
+                    break
+                change = (uses[i] > 0) - sum(uses[a] == 1 for a in operands[i])
+                if change < least:
+                    found, least = k, change
+                    if change < 0:
+                        break
+            if found < 0 and narrow and not coming and ready:
+                found = next((k for k, (_, i) in enumerate(ready) if free[_PORTS.get(nodes[i].op, _LOGIC)]), -1)
+            if found < 0:
+                break
+            i = ready.pop(found)[1]
+            free[_PORTS.get(nodes[i].op, _LOGIC)] -= 1
+            order.append(i)
+            for a in operands[i]:
+                uses[a] -= 1
+                alive -= uses[a] == 0
+            alive += uses[i] > 0
+            peak = max(peak, alive)
+            for user in users[i]:
+                there[user] = max(there[user], cycle + latency[i])
+                waiting[user] -= 1
+                if waiting[user] == 0:
+                    heapq.heappush(coming, (there[user], user))
+        cycle += 1
+    return Order(tuple(order), peak)
+
+
+def _needed(wanted: Sequence[int], alias: Sequence[int], operands: Sequence[Sequence[int]]) -> list[int]:
+    """What the wanted values need, ascending, they themselves included."""
+    found: set[int] = set()
+    stack = [alias[i] for i in wanted]
+    while stack:
+        i = stack.pop()
+        if i != -1 and i not in found:
+            found.add(i)
+            stack.extend(operands[i])
+    return sorted(found)
+
+
+def _aliases(block: Block) -> list[int]:
+    """For each primitive that whose value it is another name of: itself, or -1 for what is loaded or constant."""
+    alias: list[int] = []
+    for i, node in enumerate(block.nodes):
+        if node.op in (Op.REAL, Op.BITS):
+            alias.append(alias[node.arguments[0]])
+        else:
+            alias.append(-1 if node.op in LEAVES else i)
+    return alias

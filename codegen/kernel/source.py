@@ -5,18 +5,21 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import resources
 
+from springline.codegen.elementary import math_header
 from springline.codegen.kernel import lanes, toolchain
 from springline.codegen.kernel.job import job_header
 from springline.codegen.kernel.metrics import print_metrics
+from springline.codegen.kernel.paying import Shape, what_pays
 from springline.codegen.kernel.spec import KernelOptions, KernelSpec
+from springline.codegen.kernel.steps import print_steps
 from springline.codegen.program import Program, casadi_c, kernel_update
 from springline.model.quantities import entries
 
-_RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_math.h", "sl_lanes.h", "sl_casadi.h")
+_RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_lanes.h", "sl_casadi.h")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +41,7 @@ class KernelSource:
         return hashlib.sha256(json.dumps([self.files, self.parameters]).encode()).hexdigest()
 
 
-def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: bool, sizes: Mapping[str, int]) -> str:
+def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes: Mapping[str, int]) -> str:
     """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
     memory, sliding = program.size("z"), len(program.system.sliding)
     channels = sum(len(table.channels) for table in program.system.tables)
@@ -57,8 +60,8 @@ def preamble(program: Program, *, width: int, groups: int, packs: int, sampled: 
     assert program.size("d") == len(program.system.tables) + 4 * channels
     enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
     return f"""#define SL_W {width}
-#define SL_G {groups}
-#define SL_PACKS {packs}
+#define SL_G {shape.groups}
+#define SL_PACKS {shape.packs}
 #define SL_SAMPLED {int(sampled)}
 #define SL_NZ {memory}
 #define SL_SLIDING {sliding}
@@ -77,12 +80,6 @@ typedef struct {{
 
 enum {{ {enum} }};
 
-/* On vectors an evaluation stands by itself: inlined into the loop it would share its registers, and spill them. */
-#if SL_W > 1
-#define SL_EVALUATION static __attribute__((noinline, unused))
-#else
-#define SL_EVALUATION static inline
-#endif
 
 {kernel_update(program.system.tableau, "SL_NX - SL_NZ" if sampled and memory else "SL_NX")}"""
 
@@ -98,27 +95,37 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
     slots, size, sampled, options = program.system.slots, program.size, spec.sampled, spec.options
     if options.engine == "casadi":
         sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
-        start = preamble(program, width=1, groups=1, packs=1, sampled=sampled, sizes=sizes)
+        start = preamble(program, _ONE_BY_ONE, width=1, sampled=sampled, sizes=sizes)
+        stages = program.system.tableau.stages
+        start += f"\n#define SL_BLOCKED 0\nenum {{ SL_BLOCKS = {stages}, SL_PER_BLOCK = 1, SL_GAINS = 0 }};\n"
         parameters = tuple(slot.key for slot in slots)
         start = f"{start}\n{print_metrics(program.system)}"
         files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}
     else:
         width = options.width or toolchain.native_vector_width(options.compiler)
-        groups = options.groups or (2 if width > 1 else 1)
-        # The plant alone is a short evaluation and a long chain: others have to fill its gaps.
-        packs = options.packs or (2 if sampled and width > 1 else 1)
-        emission = lanes.emit(program, spec.constants, groups)
-        start = preamble(program, width=width, groups=groups, packs=packs, sampled=sampled, sizes=emission.sizes)
+
+        def shape(operations: int) -> Shape:
+            best = what_pays(width, sampled, operations)
+            return replace(
+                best,
+                span=options.span or best.span,
+                groups=options.groups or best.groups,
+                packs=options.packs or best.packs,
+            )
+
+        emission = lanes.emit(program, spec.constants)
+        steps = print_steps(emission.values, sampled, shape)
+        start = preamble(program, steps.shape, width=width, sampled=sampled, sizes=emission.sizes)
         parameters = emission.tunable
-        files = {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}"}
+        files = {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}\n{steps.text}"}
     return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)
 
 
 def best_flags(compiler: toolchain.Compiler) -> tuple[str, ...]:
     """Optimisation flags that make the fastest kernel with this compiler on this machine."""
     flags = ("-O3", *toolchain.native_flags(compiler))
-    if compiler.family == "gcc":  # its scheduler before register allocation hides the latencies
-        flags += ("-fschedule-insns", "-fsched-pressure", "-mtune=generic")
+    if compiler.family == "gcc":  # the order of a block is made for the processor: let it stand
+        flags += ("-fno-schedule-insns", "-fno-schedule-insns2", "-mtune=generic")
     return flags
 
 
@@ -127,8 +134,12 @@ def _flags(options: KernelOptions) -> tuple[str, ...]:
     return (*wanted, "-std=gnu99", "-fvisibility=hidden", "-Wno-unused-parameter", "-Wno-psabi", "-lm")
 
 
+_ONE_BY_ONE = Shape("evaluation", 1, 1, 0)
+
+
 @lru_cache(maxsize=1)
 def runtime_sources() -> dict[str, str]:
     """The C that all kernels share, by file name."""
     folder = resources.files("springline.codegen") / "runtime"
-    return {"simulate.h": job_header(), **{name: (folder / name).read_text() for name in _RUNTIME}}
+    files = {"simulate.h": job_header(), "sl_math.h": math_header()}
+    return {**files, **{name: (folder / name).read_text() for name in _RUNTIME}}

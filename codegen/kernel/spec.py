@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Literal, get_args
 
+from springline.codegen.kernel.paying import Span
 from springline.codegen.kernel.toolchain import Compiler
 from springline.codegen.nearest import nearest
 from springline.codegen.numbers import real, whole
@@ -25,6 +26,7 @@ class KernelOptions:
     engine   "lanes" or "casadi" (the reference, one run at a time, every parameter tunable)
     width    lanes in a vector, None for the machine's
     groups   vectors worked on at once to hide latency, None for what pays
+    span     what is printed as one block: "evaluation", "stage" or "step", None for what pays
     packs    so many times width x groups runs go through time side by side, None for what pays
     flags    optimisation flags, None for the best this machine can do
     compiler  None for the one that is found
@@ -34,6 +36,7 @@ class KernelOptions:
     engine: Engine = "lanes"
     width: int | None = None
     groups: int | None = None
+    span: Span | None = None
     packs: int | None = None
     flags: tuple[str, ...] | None = None
     compiler: Compiler | None = None
@@ -41,6 +44,8 @@ class KernelOptions:
     def __post_init__(self) -> None:
         if self.engine not in get_args(Engine):
             raise ValueError(f"engine is {self.engine!r}, expected one of {', '.join(get_args(Engine))}")
+        if self.span not in (None, *get_args(Span)):
+            raise ValueError(f"span is {self.span!r}, expected one of {', '.join(get_args(Span))}")
         for name in ("width", "groups", "packs"):
             if getattr(self, name) is not None:
                 whole(name, getattr(self, name), 1, _MOST)

@@ -15,7 +15,9 @@ from .operations import MASKS as MASKS
 from .operations import POWERS as POWERS
 from .operations import SPECIAL_POWERS as SPECIAL_POWERS
 from .operations import formula as formula
+from .operations import function_name as function_name
 from .operations import print_operation as print_operation
+from .stepping import kept_slopes as kept_slopes
 from .stepping import kernel_update as kernel_update
 from .stepping import scalar_slopes as scalar_slopes
 from .stepping import scalar_stages as scalar_stages

@@ -125,8 +125,17 @@ def print_operation(
         return f"{constant(1.0)} / {operands[0]}"
     if op in POWERS and exponent in SPECIAL_POWERS:
         return call(f"pow_{SPECIAL_POWERS[exponent]}", operands[:1])
+    return call(function_name(op, library, origin), operands)
+
+
+def function_name(op: int, library: str, origin: str) -> str:
+    """The elementary function that an operation is, without the prefix of its library.
+
+    origin  the Function the operation stands in, for the message
+    Raises UnprintableOperation.
+    """
     if op in FUNCTIONS[library]:
-        return call(FUNCTIONS[library][op], operands)
+        return FUNCTIONS[library][op]
     raise UnprintableOperation(
         f"the operation {operation_name(op)} of the Function {origin!r} cannot be printed: "
         f"there is no {library}_ function for it"

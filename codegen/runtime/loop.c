@@ -81,7 +81,8 @@ typedef struct {
   sl_group wished[SL_NJ], a_law[SL_NJ]; /* u and the law before their limits, which turn what is no number into one */
   sl_group states[2][SL_NX];       /* x and next, in turn */
   sl_group *x, *next;              /* the state, and the next one as far as it is summed up */
-  sl_group at[SL_NX];              /* where a stage is evaluated */
+  sl_group at[2][SL_NX];           /* where a stage is evaluated, in turn */
+  sl_v gains[SL_GAINS + 1];        /* the integrator's factors times the step */
   sl_group kept[SL_KEPT + 1][SL_NX];              /* slopes of the stages that sl_kept names */
   sl_time times[SL_INSTANTS + 1];                 /* the nodes of the step, and its end */
   sl_group varying[SL_INSTANTS + 1][SL_NV + 1];   /* what varies at these times, in turn */
@@ -259,26 +260,6 @@ static void observe(sl_pack *pack, int64_t k, sl_time now) {
   if (job->output_every > 0 && (k % job->output_every == 0 || k == job->steps)) write_row(pack, k, now, 0, pack->lanes);
 }
 
-/* A stage of a step, from x into next; e, sigma and u become those at the start of the step. */
-static void run_stage(sl_pack *pack, int64_t k, int stage) {
-  const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
-  const sl_group *at = stage == 0 ? x : (const sl_group *)pack->at;
-  sl_group once[SL_NX], *slope = sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]];
-#if SL_SAMPLED
-  (void)k;
-  kernel_plant(pack->times[sl_when[stage]], at, (const sl_group *)pack->u, p, r, slope);
-#else
-  if (stage == 0) {
-    kernel_closed(pack->times[0], at, p, r, slope, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
-    observe(pack, k, pack->times[0]);
-  } else {
-    sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ], wished[SL_NJ], a_law[SL_NJ];
-    kernel_closed(pack->times[sl_when[stage]], at, p, r, slope, u, e, sigma, wished, a_law);
-  }
-#endif
-  kernel_update(stage, pack->job->step, x, slope, pack->kept, pack->next, pack->at);
-}
-
 #if SL_SAMPLED
 /* Control of step k: a new sample, or the held one with its error and sliding variable. */
 static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
@@ -299,6 +280,48 @@ static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
   }
 }
 #endif
+
+/* A stage of step k by the complete functions; e, sigma and u become those at the start of the step. */
+static void run_stage(sl_pack *pack, int64_t k, int stage, const sl_group *from, sl_group *slope) {
+  const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
+  const sl_group *at = stage == 0 ? x : from;
+#if SL_SAMPLED
+  if (stage == 0) sample_control(pack, k, pack->times[0]);
+  kernel_plant(pack->times[sl_when[stage]], at, (const sl_group *)pack->u, p, r, slope);
+#else
+  (void)k;
+  if (stage == 0) {
+    kernel_closed(pack->times[0], at, p, r, slope, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
+  } else {
+    sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ], wished[SL_NJ], a_law[SL_NJ];
+    kernel_closed(pack->times[sl_when[stage]], at, p, r, slope, u, e, sigma, wished, a_law);
+  }
+#endif
+}
+
+/* A block of stages; where a rare case is met, they are computed again by the complete functions. */
+static void run_block(sl_pack *pack, int64_t k, int block) {
+  const sl_group *x = (const sl_group *)pack->x;
+  sl_group *from = pack->at[block & 1], *to = pack->at[(block + 1) & 1], once[SL_NX];
+  int stage = block * SL_PER_BLOCK, end = stage + SL_PER_BLOCK, fine = 0, fused = 0;
+#if SL_BLOCKED
+  const sl_block *chosen = SL_SAMPLED && block == 0 && k % pack->job->hold != 0 ? &SL_HELD : &sl_blocks[block];
+  sl_group *slope = sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]];
+  fused = SL_FUSED;
+  fine = chosen->compute(pack->times + chosen->instant, (const sl_v *)pack->gains + chosen->gain,
+                         (double)pack->job->hold * pack->job->step, (const sl_group *)pack->p,
+                         (const sl_group *)pack->r, x, (const sl_group *)from, pack->next, to, pack->kept, slope,
+                         pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
+#endif
+  if (!SL_LIKELY(fine && fused)) {
+    for (; stage < end; stage++, from = to) {
+      sl_group *slope = sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]];
+      if (!fine) run_stage(pack, k, stage, (const sl_group *)from, slope);
+      kernel_update(stage, pack->job->step, x, slope, pack->kept, pack->next, to);
+    }
+  }
+  if (block == 0) observe(pack, k, pack->times[0]);
+}
 
 /* e, sigma and u at the end of the run. */
 static void control_at_end(sl_pack *pack, int64_t k, sl_time now) {
@@ -330,6 +353,9 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
     if (lane < pack->lanes && job->rows) job->rows[run] = 0;
     if (job->limits) set_limits(pack, lane, lane < pack->lanes ? job->limits : NULL);
   }
+#if SL_BLOCKED
+  for (i = 0; i < SL_GAINS; i++) pack->gains[i] = slv_set(sl_gain[i] * job->step);
+#endif
   kernel_run((const sl_group *)pack->p, pack->r);
   sl_table_data(job->tables, SL_NTABLES, job->start_time, d, 1);
   kernel_start(job->start_time, d, (const sl_group *)pack->p, (const sl_group *)pack->r, pack->x);
@@ -364,10 +390,6 @@ static void begin_step(sl_pack *pack, int64_t k) {
   pack->times[0] = pack->times[SL_INSTANTS];
   for (m = 1; m < SL_INSTANTS; m++) pack->times[m] = time_at(pack, k * SL_INSTANTS + m, pack->varying[m]);
   pack->times[SL_INSTANTS] = time_at(pack, (k + 1) * SL_INSTANTS, free);
-#if SL_SAMPLED
-  sample_control(pack, k, pack->times[0]);
-  observe(pack, k, pack->times[0]);
-#endif
 }
 
 static void end_step(sl_pack *pack, int64_t k, double bound) {
@@ -392,16 +414,16 @@ static void end_runs(sl_pack *pack, int64_t k) {
 static void run_packs(sl_pack *packs, int count, const sl_job *job) {
   const double bound = sl_fmin(job->bound, DBL_MAX);
   int64_t k, reported = 0, runs = 0;
-  int stage, i, live = 1;
+  int block, i, live = 1;
   for (i = 0; i < count; i++) runs += packs[i].lanes;
   for (k = 0; k < job->steps && live > 0; k++) {
     for (i = 0; i < count; i++) {
       if (packs[i].live > 0) begin_step(&packs[i], k);
     }
 #pragma GCC unroll 1
-    for (stage = 0; stage < SL_STAGES; stage++) {
+    for (block = 0; block < SL_BLOCKS; block++) {
       for (i = 0; i < count; i++) {
-        if (packs[i].live > 0) run_stage(&packs[i], k, stage);
+        if (packs[i].live > 0) run_block(&packs[i], k, block);
       }
     }
     for (i = live = 0; i < count; i++) {

@@ -278,29 +278,6 @@ static inline sl_v slv_put(sl_v x, int lane, double value) {
       (r) = r_;                             \
     }                                       \
   } while (0)
-#define SL_PATCH_REDUCE(ok, x, hi, lo, n)            \
-  do {                                               \
-    const sl_m ok_ = (ok);                           \
-    if (!SL_LIKELY(slv_all(ok_))) {                  \
-      sl_v x_ = (x), hi_ = *(hi), lo_ = *(lo);       \
-      sl_b n_ = (n);                                 \
-      sl_m m_ = ok_;                                 \
-      slv_reduce_rare(&x_, &hi_, &lo_, &n_, &m_);    \
-      *(hi) = hi_;                                   \
-      *(lo) = lo_;                                   \
-      (n) = n_;                                      \
-    }                                                \
-  } while (0)
-
-SL_RARE void slv_reduce_rare(const sl_v *x, sl_v *hi, sl_v *lo, sl_b *n, const sl_m *ok) {
-  for (int lane = 0; lane < SL_W; lane++) {
-    double h, l;
-    if (SL_LANE(*ok, lane)) continue;
-    SL_LANE(*n, lane) = sl_reduce_rare(SL_LANE(*x, lane), &h, &l);
-    SL_LANE(*hi, lane) = h;
-    SL_LANE(*lo, lane) = l;
-  }
-}
 
 #include "sl_math.h"
 
@@ -321,7 +298,6 @@ static inline sl_m slv_yes(void) { return slv_set(0.0) == 0.0; }
 #define SL_PASS_OK , ok
 #define SL_PATCH1(fine, r, name, x) (*ok &= (fine))
 #define SL_PATCH2(fine, r, name, x, y) (*ok &= (fine))
-#define SL_PATCH_REDUCE(fine, x, hi, lo, n) (*ok &= (fine))
 
 #include "sl_math.h"
 

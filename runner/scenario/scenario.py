@@ -578,7 +578,7 @@ def _without_equal(value: object) -> Any:
 @lru_cache(maxsize=64)
 def _expect_printable(structure: Structure) -> None:
     """Raise UnprintableOperation, or whatever a user's class raises, for a structure that no kernel can be made of."""
-    lanes.emit(program(structure), {}, 1)
+    lanes.emit(program(structure), {})
 
 
 def _shape(table: Mapping[str, Any], coordinates: Sequence[str]) -> SignalShape:

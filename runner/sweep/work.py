@@ -84,7 +84,7 @@ _COMPILING = Lock()
 @lru_cache(maxsize=512)
 def _emitted(spec: KernelSpec) -> tuple[str, tuple[str, ...]]:
     """Identity and parameters of a kernel, whatever its options."""
-    emission = lanes.emit(program(spec.structure), spec.constants, 1)
+    emission = lanes.emit(program(spec.structure), spec.constants)
     text = canonical_json({**_runtime_tokens(), "kernel.h": tokens(emission.text), "sampled": spec.sampled})
     return sha256(text).hexdigest(), emission.tunable
 

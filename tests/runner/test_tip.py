@@ -71,10 +71,10 @@ def test_it_follows_a_base_from_a_record_too(tmp_path: Path) -> None:
 def test_rows_alone_compute_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """All that a batch evaluates in its steps has as many operations as without a tip."""
     structure = Structure(base_motion=SignalShape("sine", (1, 1, 1)))
-    with_tip = lanes.emit(program(structure), {}, 1)
+    with_tip = lanes.emit(program(structure), {})
     monkeypatch.setattr(type(MECHANISMS[structure.mechanism]), "tip", lambda self, q, p: None)
     program.cache_clear()
-    without = lanes.emit(program(structure), {}, 1)
+    without = lanes.emit(program(structure), {})
     program.cache_clear()
     per_step = ("closed", "control", "error", "plant", "uniform", "varying", "signals", "start")
     assert {name: with_tip.counts[name] for name in per_step} == {name: without.counts[name] for name in per_step}

@@ -6,6 +6,7 @@ from importlib import resources
 from importlib.metadata import version
 from typing import Any
 
+from springline.codegen.elementary import math_header
 from springline.codegen.export import Export, Port, check_linked, made_with, operations
 from springline.codegen.export.c.interface import TypedInterface
 from springline.codegen.export.c.model import model_files
@@ -23,8 +24,11 @@ def generate_files(export: Export) -> tuple[dict[str, bytes], dict[str, Any]]:
     """
     check_linked(export.prefix)
     runtime = resources.files("springline.codegen") / "runtime"
-    headers = ("sl_mathf.h",) if export.real == "float" else ("sl_math.h", "sl_casadi.h")
-    model = {**model_files(export), **{f"src/{name}": (runtime / name).read_bytes() for name in headers}}
+    if export.real == "float":
+        headers = {"sl_mathf.h": (runtime / "sl_mathf.h").read_bytes()}
+    else:
+        headers = {"sl_math.h": math_header().encode(), "sl_casadi.h": (runtime / "sl_casadi.h").read_bytes()}
+    model = {**model_files(export), **{f"src/{name}": content for name, content in headers.items()}}
     interface = TypedInterface(export)
     files = {
         **model,

@@ -6,6 +6,7 @@ import math
 from importlib import resources
 from typing import Any
 
+from springline.codegen.elementary import math_header
 from springline.codegen.export import Export, check_files, provenance
 from springline.codegen.export.c import TypedInterface, text_files
 from springline.codegen.export.fmu.settings import FmiVersion, Settings
@@ -39,7 +40,7 @@ def sources(
     own = {path.rpartition("/")[2]: text for path, text in texts.items() if path.startswith(("include/", "src/"))}
     files = {name: own.pop(name) for name in [*own] if name.startswith("sl_")}
     runtime = resources.files("springline.codegen") / "runtime"
-    files["sl_math.h"] = (runtime / "sl_math.h").read_bytes()
+    files["sl_math.h"] = math_header().encode()
     for name in (*_HEADERS[version], f"fmi{version}.c"):
         files[name] = (runtime / "fmu" / name).read_bytes()
     steps = [f"{part}.c", *([] if part == "controller" else ["stepping.c"])]

@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from springline.codegen.elementary import math_header
+
 Floats = NDArray[np.float64]
 Bits = NDArray[np.uint64]
 RequireTool = Callable[..., str]
@@ -84,9 +86,19 @@ def source() -> str:
 def compile_library(compiler: str, flags: list[str], folder: Path) -> Path:
     """The functions of source(), in a library of its own that refers to no symbol of another."""
     (folder / "api.c").write_text(source())
+    (folder / "sl_math.h").write_text(math_header())
     output = folder / f"{Path(compiler).name}{''.join(flags)}.so".replace("=", "_")
     fixed = ["-std=gnu99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-fPIC", "-shared"]
-    command = [compiler, *fixed, *flags, f"-I{RUNTIME}", "-nostdlib", "-Wl,-z,defs", str(folder / "api.c")]
+    command = [
+        compiler,
+        *fixed,
+        *flags,
+        f"-I{RUNTIME}",
+        "-nostdlib",
+        "-Wl,-z,defs",
+        f"-I{folder}",
+        str(folder / "api.c"),
+    ]
     done = subprocess.run([*command, "-o", str(output)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return output
@@ -418,7 +430,8 @@ def test_scalar_header_is_clean_and_needs_no_library(
     compiler: str, level: str, require_tool: RequireTool, tmp_path: Path
 ) -> None:
     (tmp_path / "use.c").write_text(scalar_use())
-    command = [require_tool(compiler), *WARNINGS, level, "-ffp-contract=off", f"-I{RUNTIME}", "-c", "use.c"]
+    (tmp_path / "sl_math.h").write_text(math_header())
+    command = [require_tool(compiler), *WARNINGS, level, "-ffp-contract=off", "-c", "use.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     symbols = subprocess.run([require_tool("nm"), "use.o"], cwd=tmp_path, capture_output=True, text=True, check=True)
@@ -431,6 +444,7 @@ def test_arithmetic_that_is_not_ieee_double_is_refused(
     flags: list[str], require_tool: RequireTool, tmp_path: Path
 ) -> None:
     (tmp_path / "use.c").write_text('#include "sl_math.h"\n')
-    command = [require_tool("gcc"), "-fsyntax-only", "-ffreestanding", *flags, f"-I{RUNTIME}", "use.c"]
+    (tmp_path / "sl_math.h").write_text(math_header())
+    command = [require_tool("gcc"), "-fsyntax-only", "-ffreestanding", *flags, "use.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode != 0 and "sl_math.h needs" in done.stderr

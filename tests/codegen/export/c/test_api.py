@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from springline.codegen.elementary import math_header
 from springline.codegen.export import bind
 from springline.codegen.export.bound import MODEL_FUNCTIONS
 from springline.codegen.export.c import baking, generate_files
@@ -231,7 +232,7 @@ def test_refusals_name_the_cause(arguments: dict, message: str) -> None:
 
 def compiled(text: str, *flags: str) -> Path:
     runtime = ROOT / "codegen" / "runtime"
-    sources = {"m.c": text, **{name: (runtime / name).read_text() for name in ("sl_casadi.h", "sl_math.h")}}
+    sources = {"m.c": text, "sl_casadi.h": (runtime / "sl_casadi.h").read_text(), "sl_math.h": math_header()}
     return toolchain.build_library(sources, main="m.c", flags=("-Wno-unused-parameter", "-O1", *flags))
 
 

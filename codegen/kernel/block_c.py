@@ -1,0 +1,85 @@
+"""A block as C on vectors: a statement for each operation and group."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from springline.codegen.elementary import Kind, Op
+from springline.codegen.kernel.block import Block, Primitive
+from springline.codegen.program import literal
+
+_TYPES = {Kind.REAL: "sl_v", Kind.BITS: "sl_b", Kind.MASK: "sl_m"}
+_INFIX = {
+    Op.ADD: "+",
+    Op.SUB: "-",
+    Op.MUL: "*",
+    Op.DIV: "/",
+    Op.BIT_AND: "&",
+    Op.BIT_OR: "|",
+    Op.BIT_XOR: "^",
+    Op.BIT_ADD: "+",
+    Op.BIT_SUB: "-",
+    Op.SHIFT_LEFT: "<<",
+    Op.SHIFT_RIGHT: ">>",
+    Op.LT: "<",
+    Op.LE: "<=",
+    Op.EQ: "==",
+    Op.NE: "!=",
+    Op.AND: "&",
+    Op.OR: "|",
+}
+
+
+def statements(block: Block, order: Sequence[int], groups: int, indent: str) -> list[str]:
+    """Statements of a block in this order, for all groups side by side; `ok`, `ok_0`, ... collect where it holds."""
+    nodes = block.nodes
+    same: list[int] = []  # real and bits are other names of the same
+    for i, node in enumerate(nodes):
+        same.append(same[node.arguments[0]] if node.op in (Op.REAL, Op.BITS) else i)
+    scheduled, fine = set(order), {same[i] for i in block.fine}
+    stores: dict[int, list[tuple[str, int]]] = {}
+    for place, i in block.stores:
+        stores.setdefault(same[i] if same[i] in scheduled else -1, []).append((place, i))
+
+    def suffix(g: int) -> str:
+        return f"_{g}" if groups > 1 else ""
+
+    def value(i: int, g: int) -> str:
+        node = nodes[i]
+        if node.op is Op.INPUT:
+            return node.text.replace("@", str(g))
+        if node.op is Op.REAL_CONSTANT:
+            return f"slv_set({literal(float(node.number))})"
+        if node.op is Op.BITS_CONSTANT:
+            return f"UINT64_C({int(node.number):#x})"
+        if node.op in (Op.REAL, Op.BITS):
+            return f"slv_{node.op.value[0]}({value(node.arguments[0], g)})"
+        return block.labels.get(i, f"a{i}") + suffix(g)
+
+    def store(i: int, g: int) -> list[str]:
+        return [f"{indent}{place.replace('@', str(g))} = {value(k, g)};" for place, k in stores.get(i, ())]
+
+    lines = []
+    for i in order:
+        for g in range(groups):
+            operands = [value(k, g) for k in nodes[i].arguments]
+            expression = _expression(nodes[i], operands)
+            lines.append(f"{indent}const {_TYPES[nodes[i].op.kind]} {value(i, g)} = {expression};")
+            if i in fine:
+                lines.append(f"{indent}ok{suffix(g)} = ok{suffix(g)} & {value(i, g)};")
+            lines.extend(store(i, g))
+    for g in range(groups):
+        lines.extend(store(-1, g))  # what was only loaded
+    return lines
+
+
+def _expression(node: Primitive, operands: Sequence[str]) -> str:
+    if node.op in (Op.SHIFT_LEFT, Op.SHIFT_RIGHT):
+        return f"{operands[0]} {_INFIX[node.op]} {int(node.number)}"
+    if node.op in _INFIX:
+        return f"{operands[0]} {_INFIX[node.op]} {operands[1]}"
+    if node.op is Op.NEG:
+        return f"-{operands[0]}"
+    if node.op is Op.BELOW:
+        return f"slv_below({operands[0]}, UINT64_C({int(node.number):#x}))"
+    return f"slv_{node.op.value[0]}({', '.join(operands)})"

@@ -1,0 +1,53 @@
+"""What is printed as one block, and how many vectors go side by side: what pays, by instruction set and size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Span = Literal["evaluation", "stage", "step"]
+"""What a block covers: an evaluation of the slopes, a stage with its update, or a whole step."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """How the steps of a kernel are printed; none of it changes a bit.
+
+    span    what a block covers
+    groups  vectors that each statement is printed for, side by side
+    packs   packs of groups that go through time in turn, block by block
+    alive   values of a group from which on the order saves registers
+    """
+
+    span: Span
+    groups: int
+    packs: int
+    alive: int
+
+
+# By lanes of a vector, without and with sampled control. More lanes come with more registers.
+_SMALL: dict[int, tuple[Shape, Shape]] = {
+    8: (Shape("step", 1, 2, 28), Shape("step", 2, 2, 14)),
+    4: (Shape("stage", 2, 1, 6), Shape("step", 2, 1, 6)),
+    2: (Shape("stage", 2, 1, 6), Shape("step", 2, 1, 6)),
+    1: (Shape("step", 1, 1, 12), Shape("step", 1, 1, 12)),
+}
+# Blocks of many operations have enough to do by themselves, and compilers take more than their share of time for them.
+_LARGE = {
+    8: (Shape("evaluation", 2, 1, 14), Shape("evaluation", 2, 2, 14)),
+    4: (Shape("evaluation", 2, 1, 6), Shape("evaluation", 2, 2, 6)),
+    2: (Shape("evaluation", 2, 1, 6), Shape("evaluation", 2, 2, 6)),
+    1: (Shape("evaluation", 1, 1, 12), Shape("evaluation", 1, 1, 12)),
+}
+_MOST = 4000
+"""Operations of all blocks of a step, beyond which the kernel is large."""
+
+
+def what_pays(width: int, sampled: bool, operations: int) -> Shape:
+    """The Shape of a kernel.
+
+    width       lanes of a vector
+    operations  of the evaluations of a step
+    """
+    table = _SMALL if operations <= _MOST else _LARGE
+    return table[max(lanes for lanes in table if lanes <= width)][sampled]

@@ -1,0 +1,215 @@
+"""The steps of a loop as blocks: which values go into which, and the C functions they become.
+
+A step is evaluations of the slopes at the stages of the integrator, and the sums that lead from one to the next. With
+control in continuous time an evaluation is control and plant; with sampled control the first stage of a step takes the
+sample, or holds the last, and all others are the plant alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from springline.codegen.kernel.block import Block, Expansion
+from springline.codegen.kernel.block_c import statements
+from springline.codegen.kernel.loop_values import LoopValues
+from springline.codegen.kernel.paying import Shape
+from springline.codegen.kernel.schedule import scheduled
+from springline.codegen.program import Binding, kept_slopes, literal, updates
+
+_SHOWN = ("u", "e", "sigma", "wished", "a_law")
+
+PREAMBLE = """\
+/* A block takes the packs through a part of a step, in the common case; it returns 0 where a lane meets a rare one, and
+ * what it has written is then to be computed again by the complete functions. `times` and `gains` are those of its
+ * first stage. A block stands by itself: inlined into the loop it would share its registers, and spill them. */
+#define SL_BLOCK_FUNCTION static __attribute__((noinline, unused))
+#define SL_BLOCK_ARGUMENTS \\
+  const sl_time *times, const sl_v *restrict gains, double period, const sl_group *restrict p, \\
+      const sl_group *restrict r, const sl_group *restrict x, const sl_group *restrict from, sl_group *restrict next, \\
+      sl_group *restrict at, sl_group (*restrict kept)[SL_NX], sl_group *restrict slope, sl_group *restrict u, \\
+      sl_group *restrict e, sl_group *restrict sigma, sl_group *restrict wished, sl_group *restrict a_law
+
+typedef struct {
+  int (*compute)(SL_BLOCK_ARGUMENTS);
+  int instant, gain; /* the first it needs */
+} sl_block;
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """The printed blocks, how they are shaped, and operations per run of each."""
+
+    text: str
+    shape: Shape
+    counts: dict[str, int]
+
+
+def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int], Shape]) -> Steps:
+    """Print the blocks of a step; `shape` is asked with the operations of the evaluations of a step."""
+    builder = _Builder(values, sampled)
+    tableau = values.program.system.tableau
+    every = list(range(tableau.stages))
+    first = len(builder.evaluation(0, builder.variants[0]).nodes)
+    operations = first + sum(len(builder.evaluation(1, builder.variants[0]).nodes) for _ in every[1:])
+    chosen = shape(operations)
+    spans = [every] if chosen.span == "step" else [[stage] for stage in every]
+    functions: dict[str, str] = {}  # body -> name: equal stages are one function
+    counts: dict[str, int] = {}
+    gains: list[float] = []
+
+    def function(stages: Sequence[int], variant: str, gain: int) -> str:
+        factors: dict[float, int] = {}
+        if chosen.span == "evaluation":
+            block = builder.evaluation(stages[0], variant)
+        else:
+            block = builder.stages(stages, variant, factors)
+        order = scheduled(block, chosen.alive)
+        masks = [f"ok_{g}" if chosen.groups > 1 else "ok" for g in range(chosen.groups)]
+        body = "\n".join([
+            *(f"  sl_m {mask} = slv_yes();" for mask in masks),
+            *statements(block, order.places, chosen.groups, "  "),
+            f"  return slv_all({' & '.join(masks)});",
+            "}\n",
+        ])  # fmt: skip
+        gains.extend(list(factors)[len(gains) - gain :])
+        if body not in functions:
+            name = functions[body] = f"{variant}_{stages[0]}"
+            counts[name] = len(order.places)
+            text.append(
+                f"/* {counts[name]} operations a run, {order.alive} values at once */\n"
+                f"SL_BLOCK_FUNCTION int kernel_{name}(SL_BLOCK_ARGUMENTS) {{\n{body}"
+            )
+        return f"{{kernel_{functions[body]}, {tableau.when[stages[0]]}, {gain}}}"
+
+    text: list[str] = ["/* ---- a step, block by block ---- */\n", "#define SL_BLOCKED 1", PREAMBLE]
+    rows, held = [], ""
+    for stages in spans:
+        gain = len(gains)
+        rows.append(function(stages, builder.variants[0] if stages[0] == 0 else "later", gain))
+        if stages[0] == 0 and sampled:
+            held = function(stages, "held", gain)
+    fused = int(chosen.span != "evaluation")
+    text += [
+        f"#define SL_FUSED {fused} /* whether blocks sum up the next state, too */",
+        f"enum {{ SL_BLOCKS = {len(spans)}, SL_PER_BLOCK = {len(spans[0])}, SL_GAINS = {len(gains)} }};",
+        f"static const double sl_gain[SL_GAINS + 1] = {{{', '.join(map(literal, [*gains, 0.0]))}}};",
+        f"static const sl_block sl_blocks[SL_BLOCKS] = {{{', '.join(rows)}}};",
+        *(
+            [f"static const sl_block sl_held = {held};", "#define SL_HELD sl_held"]
+            if sampled
+            else ["#define SL_HELD sl_blocks[0]"]
+        ),
+    ]
+    return Steps("\n".join(text), chosen, counts)
+
+
+class _Builder:
+    """Makes the blocks of a loop. Variants of the first stage: closed, or sample and held; of others: later."""
+
+    def __init__(self, values: LoopValues, sampled: bool) -> None:
+        self.values, self.sampled = values, sampled
+        self.variants = ("sample", "held") if sampled else ("closed",)
+        program = values.program
+        self.tableau = program.system.tableau
+        self.n, self.plant, self.memory = program.system.n, program.size("x"), program.size("z")
+        self.integrated = self.plant + (0 if sampled else self.memory)
+
+    def evaluation(self, stage: int, variant: str) -> Block:
+        """The slopes of one stage, into `slope`."""
+        block = Block()
+        where = [block.load(f"{'x' if stage == 0 else 'from'}[{k}][@]") for k in range(self.integrated)]
+        slopes = _Stages(self, block, stage).slopes(stage, variant if stage == 0 else "later", where)
+        block.stores += [(f"slope[{k}][@]", place) for k, place in enumerate(slopes)]
+        return block
+
+    def stages(self, stages: Sequence[int], variant: str, factors: dict[float, int]) -> Block:
+        """Stages with their sums; `factors` gets what the step is multiplied by, in the order of `gains`."""
+        block, every = Block(), updates(self.tableau)
+        kept, states = kept_slopes(self.tableau), range(self.integrated)
+        part = _Stages(self, block, stages[0])
+        x = [block.load(f"x[{k}][@]") for k in states]
+        at = x if stages[0] == 0 else [block.load(f"from[{k}][@]") for k in states]
+        entered = [stage for stage, update in enumerate(every) if update.next]
+        total = [block.load(f"next[{k}][@]") for k in states] if stages[0] > entered[0] else x
+        slopes: dict[int, Sequence[int]] = {}
+
+        def slope(stage: int, k: int) -> int:
+            return slopes[stage][k] if stage in slopes else block.load(f"kept[{kept.index(stage)}][{k}][@]")
+
+        def product(factor: float, stage: int, k: int) -> int:
+            return block.multiply(block.load(f"gains[{factors.setdefault(factor, len(factors))}]"), slope(stage, k))
+
+        for stage in stages:
+            slopes[stage] = part.slopes(stage, variant if stage == 0 else "later", at)
+            update = every[stage]
+            if update.next:
+                total = [block.sum(total[k], product(update.next, stage, k)) for k in states]
+            if update.at:
+                at = list(x)
+                for factor, other in update.at:
+                    at = [block.sum(at[k], product(factor, other, k)) for k in states]
+        for stage in stages:
+            if any(stage == other for update in every[stages[-1] + 1 :] for _, other in update.at):
+                block.stores += [(f"kept[{kept.index(stage)}][{k}][@]", slopes[stage][k]) for k in states]
+        if stages[-1] >= entered[0]:
+            block.stores += [(f"next[{k}][@]", total[k]) for k in states]
+        if every[stages[-1]].at:
+            block.stores += [(f"at[{k}][@]", at[k]) for k in states]
+        return block
+
+
+class _Stages:
+    """Evaluations within a block whose first stage is `first`."""
+
+    def __init__(self, builder: _Builder, block: Block, first: int) -> None:
+        self.builder, self.block, self.values = builder, block, builder.values
+        self.instant = builder.tableau.when[first]
+        self.expansion = Expansion(block, self.values, self._load)
+        n = builder.n
+        self.command: Sequence[int] = [block.load(f"u[{k}][@]") for k in range(n)] if builder.sampled else []
+
+    def slopes(self, stage: int, variant: str, at: Sequence[int]) -> Sequence[int]:
+        """Slopes of a stage; what the first one shows is stored."""
+        builder, block, wanted = self.builder, self.block, self.values.wanted
+        n, plant, memory = builder.n, builder.plant, builder.memory
+        where = {("x", k): at[k] for k in range(plant)} | {("z", k): at[plant + k] for k in range(len(at) - plant)}
+        instant = builder.tableau.when[stage] - self.instant
+        if variant == "later" and not builder.sampled:
+            return self.expansion.values(wanted["closed"][: len(at)], where, instant)
+        if variant == "closed":
+            places = self.expansion.values(wanted["closed"], where, instant)
+            self._show(_SHOWN, places[len(at) :])
+            return places[: len(at)]
+        if variant == "sample":
+            places = self.expansion.values(wanted["control"], where, instant)
+            self._show(_SHOWN, places[: 5 * n])
+            self.command = places[:n]
+            block.stores += [(f"next[{plant + k}][@]", place) for k, place in enumerate(places[5 * n :])]
+        elif variant == "held":
+            self._show(("e", "sigma"), self.expansion.values(wanted["error"], where, instant))
+            held = [(f"next[{plant + k}][@]", block.load(f"x[{plant + k}][@]")) for k in range(memory)]
+            block.stores += held
+        command = {("u", k): self.command[k] for k in range(n)}
+        return self.expansion.values(wanted["plant"], where | command, instant)
+
+    def _show(self, names: Sequence[str], places: Sequence[int]) -> None:
+        n = self.builder.n
+        self.block.stores += [(f"{name}[{k}][@]", places[i * n + k]) for i, name in enumerate(names) for k in range(n)]
+
+    def _load(self, i: int, instant: int) -> str:
+        """C expression of what a block is given."""
+        node, slots = self.values.graph.nodes[i], self.values.slots
+        source, k = node.source
+        if source == "p":
+            return f"p[{k}][@]"
+        if source == "z":  # with sampled control: held over the step
+            return f"x[{self.builder.plant + k}][@]"
+        if source == "h":
+            return "slv_set(period)"
+        if node.binding is Binding.RUN:
+            return f"r[{slots[Binding.RUN][i]}][@]"
+        if node.binding is Binding.UNIFORM:
+            return f"slv_set(times[{instant}].uniform[{slots[Binding.UNIFORM][i]} * SL_W])"
+        return f"times[{instant}].varying[{slots[Binding.VARYING][i]}][@]"
