@@ -103,7 +103,7 @@ def read_table(
     place = f"{file}, line {{}}, column {time.name!r}"
     _expect_increasing(t, lines, place, time, where)
     _expect_moderate_interval(t, file, time, where)
-    _expect_no_gap(t, lines, place, max_gap, where, f"{key.rpartition('.')[0]}.max_gap")
+    _expect_no_gap(t, samples.digits[0], lines, place, max_gap, where, f"{key.rpartition('.')[0]}.max_gap")
     _expect_moderate(values, file, channels, where)
     if ends == "periodic":
         values = _closed(values, file, channels, where)
@@ -226,10 +226,14 @@ def _expect_moderate_interval(t: Floats, file: str, time: Column, where: str) ->
         raise InputError(Problem(where, time.key, f"{text}{1 / _LARGEST_INTERVAL:g} s apart", f"{dt:g} s"))
 
 
-def _expect_no_gap(t: Floats, lines: list[int], place: str, max_gap: float | None, where: str, key: str) -> None:
-    """Raise InputError for the first two rows that are too far apart."""
+def _expect_no_gap(
+    t: Floats, digit: float, lines: list[int], place: str, max_gap: float | None, where: str, key: str
+) -> None:
+    """Raise InputError for the first two rows that are too far apart. digit: what the times' last one is worth, s."""
     steps = np.diff(t)
     median = float(np.median(steps))
+    if digit <= _COARSEST * median:  # 30 Hz in ms: steps of 33 or 34, and of 100 where two rows are lost
+        median += digit
     most = MAX_GAP * median if max_gap is None else max_gap
     # What a digit more or less makes of the limit itself is no gap.
     over = np.flatnonzero(steps > most * (1 + _UNIFORM) + 2 * np.spacing(np.abs(t).max()))
