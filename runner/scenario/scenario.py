@@ -405,9 +405,9 @@ class Scenario:
         sizes = np.linalg.eigvalsh(mass) if np.isfinite(mass).all() else np.array([np.nan])
         if not sizes[0] > _SINGULAR * sizes[-1]:
             at = ", ".join(f"{joint.name} = {value:.6g}" for joint, value in zip(self.system().joints, q, strict=True))
-            text = f"the mass matrix at the start ({at}) is not positive definite, its least eigenvalue is {sizes[0]:.3g}"
+            least = f"is not positive definite, its least eigenvalue is {sizes[0]:.3g}"
             remedy = "expected every joint to move a mass or an inertia (or start elsewhere, initial.q)"
-            raise InputError(Problem(where, key, f"{owner}{text}: {remedy}"))
+            raise InputError(Problem(where, key, f"{owner}the mass matrix at the start ({at}) {least}: {remedy}"))
 
     def _start_position(self, values: Floats) -> list[float]:
         """Joint coordinates at the start, n: those that are given, or the reference's."""
