@@ -5,6 +5,7 @@ Each function raises ValueError, with the class's name and what was expected, fo
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Sequence, Set
@@ -61,7 +62,19 @@ def column(owner: str, what: str, value: object, rows: int, known: Set[int]) -> 
     foreign = [item.name() for item in ca.symvar(made) if hash_of(item) not in known]
     if foreign:
         raise ValueError(f"{owner}: {what}: depends on {foreign[0]!r}, which it was not given")
+    if _has_nan(made):  # a float of a symbol is one, silently
+        text = "contains NaN, which float() and the functions of math make of an expression: use those of casadi"
+        raise ValueError(f"{owner}: {what}: {text}")
     return made
+
+
+def _has_nan(expression: ca.SX) -> bool:
+    """Whether a constant in it is NaN."""
+    graph = ca.Function("graph", ca.symvar(expression), [expression])
+    return any(
+        graph.instruction_id(k) == ca.OP_CONST and math.isnan(graph.instruction_constant(k))
+        for k in range(graph.n_instructions())
+    )
 
 
 def symbols_of(*expressions: ca.SX) -> Set[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -18,6 +19,7 @@ from springline.codegen.files import canonical_json
 from springline.codegen.nearest import nearest
 from springline.codegen.numbers import real as number
 from springline.codegen.program import Real, SignalTable, count_operations
+from springline.model.drive import COULOMB_VELOCITY, FRICTION
 from springline.model.parameters import Slot
 from springline.model.quantities import DDQ1, DERIVATIVES, DISTURBANCE, REFERENCE, SIGMA, E, Quantity, T, entries
 from springline.model.structure import Structure
@@ -221,6 +223,10 @@ def bind(
 
 _STRUCTURE = frozenset(f"control.{key}" for key in ("law", "log_form", "mode", "period", "fast", "l", "m", "p", "r"))
 
+_FRICTIONS = "|".join(item.name for item in FRICTION)
+_ABSENT_AT_ZERO = re.compile(rf"((drive|plant)\.({_FRICTIONS})|base_motion\.mount(_rpy)?)(\.\d+)?")
+_NEEDS_COULOMB = re.compile(rf"(drive|plant)\.{COULOMB_VELOCITY.name}(\.\d+)?")
+
 
 def _tunable(slots: Sequence[Slot], names: Sequence[str] | str) -> tuple[int, ...]:
     if names == "all":
@@ -235,6 +241,11 @@ def _tunable(slots: Sequence[Slot], names: Sequence[str] | str) -> tuple[int, ..
         if not found:
             if name in _STRUCTURE:
                 raise ValueError(f"{name!r} is structure and never tunable: export once for each of its values")
+            if _ABSENT_AT_ZERO.fullmatch(name):
+                text = "is zero in this scenario, and what is zero is absent from the C: give it a value other than 0"
+                raise ValueError(f"{name!r} {text}")
+            if _NEEDS_COULOMB.fullmatch(name):
+                raise ValueError(f"{name!r} only counts beside a Coulomb friction, and there is none in this scenario")
             near = nearest(name, (slot.key for slot in slots), 0.0)
             raise ValueError(f"no parameter {name!r}; the nearest name is {near!r}")
         chosen |= found

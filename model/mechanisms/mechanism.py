@@ -12,7 +12,7 @@ import casadi as ca
 from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case, symbols_of
 from springline.model.mechanisms.body import Body, Solid, kinetic_energy_of, potential_energy_of, solid
 from springline.model.mechanisms.link import Link, Segment, bodies_of, segments_of
-from springline.model.parameters import Joint, Parameter, Values
+from springline.model.parameters import POSITIVE, REAL, Joint, Parameter, Values
 from springline.model.signals import SineTerm
 
 # Of the critical damping of a motor on its spring: what the fast control adds unless a mechanism says otherwise. It is
@@ -37,7 +37,7 @@ class Mechanism:
     joints            in the order of q
     parameters        of the two energies; "g" is one of them
     motor_inertia     diagonal of M2: a parameter for each joint, or one with an entry per joint
-    stiffness         diagonal of K, likewise
+    stiffness         diagonal of K, likewise; both greater than 0 unless their bounds say otherwise
     reference_offset  constant part of the desired trajectory, one per joint; () for all zero
     reference_terms   sine terms of the desired trajectory, a tuple per joint; () for none
     start_position    initial joint coordinates; () for all zero
@@ -77,6 +77,10 @@ class Mechanism:
         for name in open_:
             setattr(cls, name, (blanks[name],) * count)
         cls._open = frozenset(open_)
+        for name in ("motor_inertia", "stiffness"):
+            declared = vars(cls).get(name)
+            if isinstance(declared, tuple) and all(isinstance(item, Parameter) for item in declared):
+                setattr(cls, name, tuple(_positive(item) for item in declared))
 
     def of_size(self, size: int) -> Mechanism:
         """The arm with `size` joints, one of `sizes`; 0 stands for as many as it has."""
@@ -159,6 +163,11 @@ class Mechanism:
             for k, item in enumerate(declared)
             for value in item.defaults(self.joints if item.per_joint else self.joints[k : k + 1])
         ]
+
+
+def _positive(parameter: Parameter) -> Parameter:
+    """A motor inertia or a stiffness, which the equations divide by: greater than 0 where its class says no bounds."""
+    return replace(parameter, bounds=POSITIVE) if parameter.bounds == REAL else parameter
 
 
 def check_mechanism(mechanism: Mechanism) -> None:

@@ -372,13 +372,13 @@ class Scenario:
         with told(keys, where):
             if keys:
                 _expect_printable(self.structure())
-        if self.structure().start == "given":
-            user = next((user for user, key in keys.items() if key == "mechanism.name"), None)
-            self._expect_bodies(where, "mechanism" if user is None else "mechanism.name", f"{user}: " if user else "")
+        user = next((user for user, key in keys.items() if key == "mechanism.name"), None)
+        self._expect_bodies(where, "mechanism" if user is None else "mechanism.name", f"{user}: " if user else "")
 
     def _expect_bodies(self, where: str, key: str, owner: str) -> None:
         """Raise InputError for masses and inertias that no arm has at the start."""
-        q, values = self.document["initial"]["q"], self.values()
+        values = self.values()
+        q = self._start_position(values)
         try:
             self.system().expect_plausible(q, values)
         except ValueError as error:
@@ -386,8 +386,18 @@ class Scenario:
         mass = np.array(self.system().function("mass_matrix")(q, values))
         sizes = np.linalg.eigvalsh(mass) if np.isfinite(mass).all() else np.array([np.nan])
         if not sizes[0] > _SINGULAR * sizes[-1]:
-            text = "the mass matrix at the start is not positive definite, its least eigenvalue is"
-            raise InputError(Problem(where, key, f"{owner}{text} {sizes[0]:.3g}"))
+            at = ", ".join(f"{joint.name} = {value:.6g}" for joint, value in zip(self.system().joints, q, strict=True))
+            least = f"is not positive definite, its least eigenvalue is {sizes[0]:.3g}"
+            remedy = "expected every joint to move a mass or an inertia (or start elsewhere, initial.q)"
+            raise InputError(Problem(where, key, f"{owner}the mass matrix at the start ({at}) {least}: {remedy}"))
+
+    def _start_position(self, values: Floats) -> list[float]:
+        """Joint coordinates at the start, n: those that are given, or the reference's."""
+        if self.structure().start == "given":
+            return [float(value) for value in self.document["initial"]["q"]]
+        row = np.concatenate([np.zeros(0), *(table.row(0.0) for table in self.tables())])
+        signals = np.array(self.system().function("signals")(0.0, row, values)).ravel()
+        return [float(value) for value in signals[: len(self.system().joints)]]
 
     def _canonical(self, overrides: Mapping[str, object], where: str) -> dict[str, object]:
         """Overrides with keys and users' classes named as the document does, so that the same is known for the same.

@@ -5,7 +5,8 @@ The loop wants samples at equal steps. What the rows' times are decides how it g
     uniform   as far as doubles tell: the rows are the samples
     rounded   30 or 60 Hz written in ms, say: every time is that of a uniform grid up to its last digit. The rows are
               the samples here, too. Through the times as written, their rounding would be in the motion: at 30 Hz, a
-              swell of 1 m and 10 s would have accelerations of up to 2 m/s^2, where it has 0.4
+              swell of 1 m and 10 s would have accelerations of up to 2 m/s^2, where it has 0.4. Rows may have been
+              lost: the cubic spline through the others, each at its place on the grid, is sampled there
     any other the times are believed, and the cubic spline through the rows is sampled at the median interval
 
 The spline passes through every sample, with its noise, and its second derivative takes noise up with the square of the
@@ -41,6 +42,8 @@ _ROUNDED = 1e-3
 # steps do differ: by chance none keeps to a grid for that long.
 _COARSEST = 1 / 3
 _ENOUGH_ROWS = 20
+# A rounded median interval miscounts the rows that a long gap has lost; the mean that follows from it does no more.
+_PASSES = 3
 # A last row this near to the first (of the channel's range) repeats it.
 _REPEATS = 1e-6
 # The step from the last row back to the first may be this much longer than the longest step between rows.
@@ -100,19 +103,33 @@ def read_table(
     place = f"{file}, line {{}}, column {time.name!r}"
     _expect_increasing(t, lines, place, time, where)
     _expect_moderate_interval(t, file, time, where)
-    _expect_no_gap(t, lines, place, max_gap, where, f"{key.rpartition('.')[0]}.max_gap")
+    _expect_no_gap(t, samples.digits[0], lines, place, max_gap, where, f"{key.rpartition('.')[0]}.max_gap")
     _expect_moderate(values, file, channels, where)
     if ends == "periodic":
         values = _closed(values, file, channels, where)
-    dt, off = _grid(t)
+    places = np.arange(len(t), dtype=np.float64)
+    dt, off = _grid(t, places)
+    jittering = False
     about = f"{time.key}: the times in column {time.name!r} of {file}"
     if off <= _UNIFORM + min(2 * float(np.spacing(np.abs(t).max())) / dt, _ROUNDED):
         rows = t[0] + dt * np.arange(len(values))
         taken = values
-    elif len(t) >= _ENOUGH_ROWS and off * dt <= samples.digits[0] * (1 + _UNIFORM) <= _COARSEST * dt:
+    elif _rounded(t, places, samples.digits[0]):
         rows = t[0] + dt * np.arange(len(values))
         taken = values
         notes.append(f"{about} are rounded to {samples.digits[0]:.3g} s: read as uniform, one every {dt:.9g} s")
+    elif _rounded(t, places := _places(t), samples.digits[0]) and places[-1] < max(_MOST_SAMPLES, len(t)):
+        dt, _ = _grid(t, places)
+        lost = int(places[-1]) + 1 - len(t)
+        if len(values) > len(t):
+            places = np.append(places, places[-1] + 1)
+        rows = t[0] + dt * places
+        taken = resampled(places, values, int(places[-1]), ends)
+        _expect_moderate(taken, file, channels, where)
+        notes.append(
+            f"{about} are rounded to {samples.digits[0]:.3g} s: read as uniform, one every {dt:.9g} s, "
+            f"{lost} of them missing, where the cubic spline through the rows is taken"
+        )
     else:
         median = float(np.median(np.diff(t)))
         rows = np.append(t, t[-1] + median) if len(values) > len(t) else t
@@ -123,9 +140,10 @@ def read_table(
         dt = float(rows[-1] - rows[0]) / count
         taken = resampled(rows, values, count, ends)
         _expect_moderate(taken, file, channels, where)
+        jittering = True
     table = spline(float(t[0]) - t0, dt, taken, ends, np.array(samples.digits[1:]))
     _expect_moderate(np.abs(table.coefficients).max(axis=2), file, channels, where)
-    if taken is not values:
+    if jittering:
         steps = np.diff(t)
         missed = _missed(table, rows - rows[0] + table.t0, values)
         notes.append(
@@ -161,10 +179,29 @@ def excess_notes(read: TableRead, channels: Sequence[Column], units: Sequence[st
     return notes
 
 
-def _grid(t: Floats) -> tuple[float, float]:
-    """The mean interval, s, and how far the times are off its multiples from the first on, in intervals."""
-    dt = float(t[-1] - t[0]) / (len(t) - 1)
-    return dt, float((np.abs(t - (t[0] + dt * np.arange(len(t)))) / dt).max())
+def _grid(t: Floats, places: Floats) -> tuple[float, float]:
+    """The interval, s, of a uniform grid from the first to the last time, and how far it is off, in intervals.
+
+    places  whole multiples of the interval at which the times stand on it
+    """
+    dt = float(t[-1] - t[0]) / float(places[-1])
+    return dt, float((np.abs(t - (t[0] + dt * places)) / dt).max())
+
+
+def _rounded(t: Floats, places: Floats, digit: float) -> bool:
+    """Whether times are those of a uniform grid, rounded to no more than `digit`, s."""
+    dt, off = _grid(t, places)
+    return len(t) >= _ENOUGH_ROWS and off * dt <= digit * (1 + _UNIFORM) <= _COARSEST * dt
+
+
+def _places(t: Floats) -> Floats:
+    """Where times stand on the grid that most of their steps are one interval of, from 0, whole numbers."""
+    steps = np.diff(t)
+    dt = float(np.median(steps))
+    for _ in range(_PASSES):
+        places = np.append(0.0, np.cumsum(np.maximum(np.rint(steps / dt), 1.0)))
+        dt = float(t[-1] - t[0]) / float(places[-1])
+    return places
 
 
 def _expect_increasing(t: Floats, lines: list[int], place: str, time: Column, where: str) -> None:
@@ -189,10 +226,14 @@ def _expect_moderate_interval(t: Floats, file: str, time: Column, where: str) ->
         raise InputError(Problem(where, time.key, f"{text}{1 / _LARGEST_INTERVAL:g} s apart", f"{dt:g} s"))
 
 
-def _expect_no_gap(t: Floats, lines: list[int], place: str, max_gap: float | None, where: str, key: str) -> None:
-    """Raise InputError for the first two rows that are too far apart."""
+def _expect_no_gap(
+    t: Floats, digit: float, lines: list[int], place: str, max_gap: float | None, where: str, key: str
+) -> None:
+    """Raise InputError for the first two rows that are too far apart. digit: what the times' last one is worth, s."""
     steps = np.diff(t)
     median = float(np.median(steps))
+    if digit <= _COARSEST * median:  # 30 Hz in ms: steps of 33 or 34, and of 100 where two rows are lost
+        median += digit
     most = MAX_GAP * median if max_gap is None else max_gap
     # What a digit more or less makes of the limit itself is no gap.
     over = np.flatnonzero(steps > most * (1 + _UNIFORM) + 2 * np.spacing(np.abs(t).max()))

@@ -76,6 +76,15 @@ class Spline:
         result: Floats = c0 + tau * (c1 + tau * (c2 + tau * c3))
         return result
 
+    def row(self, t: float) -> Floats:
+        """What the model's signals take of the table: s since a sample, and the coefficients from there on, flat.
+
+        For a time outside of the samples, those of the nearest one.
+        """
+        inside = min(max(t, self.t0), self.end)
+        k = min(max(math.floor((inside - self.t0) / self.dt), 0), len(self.coefficients) - 1)
+        return np.concatenate([[inside - (self.t0 + k * self.dt)], self.coefficients[k].ravel()])
+
     def accelerations(self) -> Floats:
         """Accelerations at the samples, (samples, channels), SI units; between them they are linear."""
         return _motion(self.coefficients, self.dt)[1]

@@ -332,7 +332,7 @@ def test_both_engines_and_a_lane_of_a_batch_give_the_same_bits(load: Any) -> Non
 
 
 MOTION = """
-import casadi as ca
+import math; import casadi as ca
 from springline.model import BaseMotion, Parameter
 
 class Circle(BaseMotion):
@@ -421,6 +421,7 @@ def test_its_parameters_vary_and_its_file_travels(circle: Path, tmp_path: Path) 
         ("0, p.heel", "ca.SX.sym('x'), p.heel", ["motion, heave: depends on 'x', which it was not given"]),
         ("0, p.heel", "'up', p.heel", ["motion, heave: expected a CasADi SX expression, got str"]),
         ("0, p.heel", "ca.SX(2, 1), p.heel", ["motion, heave: expected a scalar, got 2 x 1"]),
+        ("ca.sin(angle)", "math.sin(angle)", ["motion, surge: contains NaN", "use those of casadi"]),
         ("p.rate * t", "p.speed * t", ["there is no 'speed' here, but radius, rate, heel", "line 12"]),
         ("radius", "heave", ["parameters: 'heave' is a key of [base_motion] already"]),
         ('"of turning")', '"of turning", per_joint=True)', ["parameters, rate: expected one number"]),
@@ -455,6 +456,21 @@ def test_wrong_keys_beside_it_are_told(circle: Path, text: str, told: list[str])
 
 def springline(*arguments: object) -> Any:
     return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="springline")
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("drive.link_viscous", "is zero in this scenario"),
+        ("plant.spring_damping.0", "give it a value other than 0"),
+        ("base_motion.mount.1", "is zero in this scenario"),
+        ("drive.coulomb_velocity", "only counts beside a Coulomb friction"),
+    ],
+)
+def test_what_is_absent_at_zero_is_told_so_where_it_should_be_tunable(load: Any, name: str, told: str) -> None:
+    scenario = load(base(f"heave = {TERM}"))
+    with pytest.raises(ValueError, match=f"'{name}' {told}|{told}"):
+        bind(scenario.structure(), scenario.values(), tunable=[name])
 
 
 def test_either_name_is_tunable_in_c(load: Any, tmp_path: Path) -> None:

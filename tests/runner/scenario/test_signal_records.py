@@ -108,6 +108,45 @@ def test_times_rounded_to_milliseconds_are_those_of_a_grid(rate: float, rounding
     assert table.dt == pytest.approx(1 / rate, rel=1e-3 * rate / 599)
 
 
+@pytest.mark.parametrize("rate", [30.0, 60.0, 29.97])
+@pytest.mark.parametrize("ends", ["hold", "error", "periodic"])
+def test_rounded_times_keep_to_their_grid_where_rows_are_lost(rate: float, ends: Ends) -> None:
+    """A frame that was dropped does not let the rounding of all others in, which would be five times the motion."""
+    count = round(60 * rate)
+    exact = np.arange(count) / rate
+    omega = 2 * math.pi * rate / count * 6
+    there = ~np.isin(np.arange(count), [17, 500, 501, count // 2])
+    text = written(np.round(exact[there], 3), np.sin(omega * exact[there]), places=3)
+    found = read(text, ends)
+    (note,) = found.notes
+    assert "are rounded to 0.001 s: read as uniform" in note and "4 of them missing" in note
+    table = found.spline
+    assert table.dt == pytest.approx(1 / rate, rel=1e-3 * rate / count)
+    assert len(table.coefficients) == (count if ends == "periodic" else count - 1)
+    dense = np.linspace(0.0, exact[-1], 9001)
+    assert np.abs(evaluate(table, dense, 2) + omega**2 * np.sin(omega * dense)).max() <= 5e-3 * omega**2
+    assert found.shown[0] == pytest.approx(omega**2, rel=5e-3), "the rows' own are at their places, too"
+    kept = np.flatnonzero(there)[:-1]
+    np.testing.assert_allclose(table.coefficients[kept, 0, 0], np.sin(omega * exact[kept]), rtol=0, atol=1e-13)
+
+
+def test_a_long_gap_among_rounded_times_is_counted_right() -> None:
+    there = np.r_[0:300, 420:700]
+    exact = np.arange(700) / 60
+    found = read(written(np.round(exact[there], 3), np.sin(exact[there]), places=3), max_gap=3.0)
+    assert "120 of them missing" in found.notes[0] and len(found.spline.coefficients) == 699
+    at = found.spline.t0 + found.spline.dt * np.arange(280)
+    np.testing.assert_allclose(found.spline.accelerations()[:280, 0], -np.sin(at), atol=1e-3)
+
+
+def test_three_intervals_are_no_gap_however_they_are_rounded() -> None:
+    """Two frames lost at 30 Hz are a step of 100 ms, where most steps are of 33."""
+    exact = np.delete(np.arange(600), [100, 101]) / 30
+    assert "2 of them missing" in read(written(np.round(exact, 3), exact, places=3)).notes[0]
+    exact = np.delete(np.arange(600), [100, 101, 102]) / 30
+    assert "a gap from 3.3 s" in refused(written(np.round(exact, 3), exact, places=3))
+
+
 def test_rows_that_do_jitter_are_not_taken_for_rounded_ones() -> None:
     t = np.round(np.arange(40) / 30, 3)
     y = np.sin(t)
