@@ -43,6 +43,11 @@ def of_square(function: Callable[[Real], Real]) -> Callable[[Real], Real]:
     return lambda z: function(mp.sqrt(z))
 
 
+def fraction(thirds: int) -> Callable[[Real], Real]:
+    """((1 - h)^(-thirds/3) - 1) / h."""
+    return lambda h: ((1 - h) ** (-mp.mpf(thirds) / 3) - 1) / h
+
+
 def polynomials() -> tuple[Polynomial, ...]:
     """All but those of the cube roots."""
     ln2, pi = mp.log(2), mp.pi
@@ -153,14 +158,14 @@ def polynomials() -> tuple[Polynomial, ...]:
         *(
             Polynomial(
                 name,
-                f"((1 - h)^(-{thirds}/3) - 1) / h, |h| <= 2.82e-6",
-                lambda h, thirds=thirds: ((1 - h) ** (-mp.mpf(thirds) / 3) - 1) / h,
+                f"((1 - h)^(-{thirds}/3) - 1) / h, |h| <= {largest}",
+                fraction(thirds),
                 lambda h: h,
-                mp.mpf("-2.82e-6"),
-                mp.mpf("2.82e-6"),
+                -mp.mpf(largest),
+                mp.mpf(largest),
                 2,
             )
-            for name, thirds in (("MINUS_ONE_THIRD", 1), ("MINUS_TWO_THIRDS", 2))
+            for name, thirds, largest in (("MINUS_ONE_THIRD", 1, "5.64e-6"), ("MINUS_TWO_THIRDS", 2, "2.82e-6"))
         ),
     )
 

@@ -117,10 +117,10 @@ POW = (
     float.fromhex("0x1.744eb860cb8a9p-3"),
     float.fromhex("0x1.41fb23ae5a2d1p-3"),
 )
-# ((1 - h)^(-1/3) - 1) / h, |h| <= 2.82e-6
+# ((1 - h)^(-1/3) - 1) / h, |h| <= 5.64e-6
 MINUS_ONE_THIRD = (
-    float.fromhex("0x1.5555555559de0p-2"),
-    float.fromhex("0x1.c71c71c726834p-3"),
+    float.fromhex("0x1.555555556777fp-2"),
+    float.fromhex("0x1.c71c71c744b7ap-3"),
 )
 # ((1 - h)^(-2/3) - 1) / h, |h| <= 2.82e-6
 MINUS_TWO_THIRDS = (

@@ -100,7 +100,7 @@ class Statements:
         roots = [*procedure.results, *([] if procedure.fine is None else [procedure.fine])]
         needed = self._needed(roots)
         uses = Counter(place for i in needed for place in self._steps[i].arguments)
-        taken, self._names = {*inputs, *results, "fine"}, dict[int, str]()
+        taken, self._names = {*inputs, *results}, dict[int, str]()
         for place, name in procedure.names.items():
             if place in needed and (uses[place] or place not in procedure.results):
                 self._names[place] = _free(name, taken)
@@ -231,17 +231,16 @@ def checked(name: str, procedure: Procedure, inputs: Sequence[str], results: Map
 
     def body() -> Iterator[str]:
         yield from code.lines
-        yield f"const SL_M fine = {code.fine};"
         if len(results) == 1:
             ((result, rare),), (value,) = results.items(), code.results
             yield f"SL_F {result} = {value};"
-            yield f"{patch}(fine, {result}, {rare}, {arguments});"
+            yield f"{patch}({code.fine}, {result}, {rare}, {arguments});"
             yield f"return {result};"
             return
         for result, value in zip(results, code.results, strict=True):
             yield f"*{result} = {value};"
         for result, rare in results.items():
-            yield f"{patch}(fine, *{result}, {rare}, {arguments});"
+            yield f"{patch}({code.fine}, *{result}, {rare}, {arguments});"
 
     if len(results) == 1:
         return _define(f"static inline SL_F SL_CHECKED({name})({parameters} SL_OK)", body())

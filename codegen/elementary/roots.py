@@ -47,11 +47,12 @@ def pow_m1_3(x: Word) -> Computed:
 
 
 def pow_m2_3(x: Word) -> Computed:
-    """x^(-2/3) from y^2; its rounding enters h and comes out again to two thirds."""
+    """x^(-2/3) = z (1 - h)^(-1/3) with z = y^2 and h = 1 - x^2 z^3, which sees the rounding of z."""
     y, fine = _start(x)
     z = named("z", y * y)
-    h = named("h", 1.0 - x * (z * y))
-    return (_step(z, h, MINUS_TWO_THIRDS),), fine
+    v = named("v", x * z)
+    h = named("h", 1.0 - (v * z) * v)
+    return (_step(z, h, MINUS_ONE_THIRD),), fine
 
 
 def pow_p1_3(x: Word) -> Computed:

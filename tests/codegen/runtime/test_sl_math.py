@@ -59,6 +59,7 @@ PLAIN = [
     "pow_p2",
     "pow_p3",
 ]
+CLOSE = ["exp", "log", "log1p", "sin", "cos", "pow_p1_3", "pow_m1_3", "pow_p2_3"]
 CHECKED_PAIRS = ["pow", "hypot", "atan2"]
 PLAIN_PAIRS = ["fmin", "fmax", "copysign"]
 ONE, TWO = [*CHECKED, *PLAIN], [*CHECKED_PAIRS, *PLAIN_PAIRS]
@@ -308,10 +309,10 @@ def accuracy() -> ModuleType:
     return module
 
 
-def test_errors_stay_below_two_ulp(accuracy: ModuleType) -> None:
+def test_errors_stay_below_what_the_documentation_promises(accuracy: ModuleType) -> None:
     rows = list(accuracy.measure(samples=400, seed=5))
     assert {row.case.function for row in rows} >= {*CHECKED, *CHECKED_PAIRS, "tanh", "atan", "asin", "acos"}
-    assert [row for row in rows if not row.error <= 2.0] == []
+    assert [row for row in rows if not row.error <= (1.6 if row.case.function in CLOSE else 2.0)] == []
 
 
 def test_an_error_would_be_seen(accuracy: ModuleType) -> None:
