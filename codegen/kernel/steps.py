@@ -119,8 +119,9 @@ class _Builder:
     def evaluation(self, stage: int, variant: str) -> Block:
         """The slopes of one stage, into `slope`."""
         block = Block()
-        where = [block.load(f"{'x' if stage == 0 else 'from'}[{k}][@]") for k in range(self.integrated)]
-        slopes = _Stages(self, block, stage).slopes(stage, variant if stage == 0 else "later", where)
+        one = not self.sampled
+        where = [block.load(f"{'x' if stage == 0 and not one else 'from'}[{k}][@]") for k in range(self.integrated)]
+        slopes = _Stages(self, block, 0 if one else stage).slopes(0 if one else stage, "closed" if one else variant if stage == 0 else "later", where)
         block.stores += [(f"slope[{k}][@]", place) for k, place in enumerate(slopes)]
         return block
 

@@ -310,7 +310,7 @@ static void run_block(sl_pack *pack, int64_t k, int block) {
   fused = SL_FUSED;
   fine = chosen->compute(pack->times + chosen->instant, (const sl_v *)pack->gains + chosen->gain,
                          (double)pack->job->hold * pack->job->step, (const sl_group *)pack->p,
-                         (const sl_group *)pack->r, x, (const sl_group *)from, pack->next, to, pack->kept, slope,
+                         (const sl_group *)pack->r, x, block == 0 && !SL_FUSED && !SL_SAMPLED ? x : (const sl_group *)from, pack->next, to, pack->kept, slope,
                          pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
 #endif
   if (!SL_LIKELY(fine && fused)) {
