@@ -1,5 +1,7 @@
 """Sums and products put together anew: the same value, nothing later, nothing more to compute, names as they were."""
 
+from functools import cache
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -83,6 +85,13 @@ def test_the_value_is_the_same_but_for_rounding(results: list[ca.SX], seed: int)
             np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-7 * max(scale, 1.0))
 
 
+@cache
+def operation(op: int, arguments: int) -> ca.Function:
+    """An operation by itself."""
+    given = [ca.SX.sym(f"a{k}") for k in range(arguments)]
+    return ca.Function("g", given, [(ca.SX.unary if arguments == 1 else ca.SX.binary)(op, *given)])
+
+
 def largest(f: ca.Function, at: list[np.ndarray]) -> float:
     """The largest value on the way."""
     work: dict[int, float] = {}
@@ -94,10 +103,7 @@ def largest(f: ca.Function, at: list[np.ndarray]) -> float:
         elif op == ca.OP_CONST:
             work[into[0]] = f.instruction_constant(k)
         elif op != ca.OP_OUTPUT:
-            arguments = [ca.DM(work[i]) for i in source]
-            one = ca.SX.sym("a", len(arguments))
-            call = ca.SX.unary if len(arguments) == 1 else ca.SX.binary
-            work[into[0]] = float(ca.Function("g", [one], [call(op, *ca.vertsplit(one))])(ca.vertcat(*arguments)))
+            work[into[0]] = float(operation(op, len(source))(*(work[i] for i in source)))
         every.append(abs(work[into[0]]) if op != ca.OP_OUTPUT else 0.0)
     return max(every)
 
