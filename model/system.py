@@ -75,7 +75,7 @@ from springline.model.quantities import (
 )
 from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
-from springline.model.symbolic import as_written
+from springline.model.symbolic import as_written, associated, without
 from springline.model.terms import Term, noted
 from springline.model.tip import tip_motion
 
@@ -330,7 +330,7 @@ class System:
         applied = actuated(self.structure.effects, self.u)
         with noted() as terms:
             dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant, self.disturbance)
-        self._terms["plant"] = tuple(terms)
+        [dx], self._terms["plant"] = self._associated([dx], terms, late=self.u)
         return {
             **self._equations(real, signals, dx),
             **self._loop(real, signals, dx),
@@ -358,8 +358,20 @@ class System:
         """What the controller computes of q1, dq1 and the rest of the state as they are."""
         with noted() as terms:
             signals = self._signals_of_control()
-        self._terms["control"] = tuple(terms)
-        return signals
+        written = [signals.command, signals.wished, signals.error, signals.sigma, signals.a_law]
+        written += [signals.dz, signals.ahead, *signals.parts.values()]
+        values, self._terms["control"] = self._associated(written, terms)
+        command, wished, error, sigma, a_law, dz, ahead, *others = values
+        parts = dict(zip(signals.parts, others, strict=True))
+        return ControlSignals(command, wished, parts, error, sigma, a_law, dz, ahead)
+
+    def _associated(
+        self, values: Sequence[ca.SX], terms: Sequence[Term], late: ca.SX | None = None
+    ) -> tuple[list[ca.SX], tuple[Term, ...]]:
+        """Values and the parts that have names, their sums and products put together in the order of being known."""
+        found = associated([*values, *(term.value for term in terms)], [self.p, self.w], late)
+        named = zip(terms, found[len(values) :], strict=True)
+        return found[: len(values)], tuple(replace(term, value=value) for term, value in named)
 
     def _signals_of_control(self) -> ControlSignals:
         nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal, self.arm.form)
@@ -380,6 +392,11 @@ class System:
         with as_written():
             flat = ca.cse([ca.densify(o) for o in outputs])
             return {name: ca.Function(name, [*inputs, self.p], flat, [*names_in, "p"], names_out)}
+
+    def _named(self, name: str, inputs: list[ca.SX], terms: list[ca.SX], names_in: list[str]) -> dict[str, ca.Function]:
+        """The parts of Function `name` that have names, as one of its own."""
+        labels = [f"term{k}" for k in range(len(terms))]
+        return self._function(f"{name}_terms", inputs, terms, names_in, labels) if terms else {}
 
     def _equations(self, real: EquationsOfMotion, seen: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
         """The equations of docs/paper.md, as they are offered to others."""
@@ -428,14 +445,8 @@ class System:
             names,
             ["u", *part_names, "e", *sigma_names],
         )
-        for name, given, given_names in (
-            ("control", ins, names),
-            ("plant", plant_in, plant_names),
-        ):
-            found = self._terms[name]
-            if found:
-                outputs, labels = [term.value for term in found], [f"term{k}" for k in range(len(found))]
-                result |= function(f"{name}_terms", given, outputs, given_names, labels)
+        result |= self._named("control", ins, [term.value for term in self._terms["control"]], names)
+        result |= self._named("plant", plant_in, [term.value for term in self._terms["plant"]], plant_names)
         if self.controller.states:
             result |= {
                 **function("rates", ins, [seen.dz], names, ["dz"]),
@@ -443,7 +454,9 @@ class System:
             }
         if self.controller.law:
             for law in {**LAWS, self.structure.law: self.controller.law}.values():
-                rate = law.with_form(self.structure.log_form).rate(sigma, self._control)
+                with noted() as terms:
+                    rate = law.with_form(self.structure.log_form).rate(sigma, self._control)
+                [rate], _ = self._associated([rate], terms)
                 result |= function(f"law_{law.name}", [sigma], [rate], ["sigma"], ["dsigma"])
         if self.tip is not None:
             result |= function("tip", [base.b, base.db, x], [self.tip], ["b", "db", "x"], ["tip"])
@@ -462,8 +475,10 @@ class System:
         y = ca.vertcat(*sensed(self.structure.effects, self._state).values())
         seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished, commanded.a_law]
         later = [commanded.dz, commanded.ahead]
+        control_terms, plant_terms = ([term.value for term in self._terms[name]] for name in ("control", "plant"))
         if self.structure.effects:
-            seen, later = (ca.substitute(values, [x], [y]) for values in (seen, later))
+            seen, later, control_terms = (ca.substitute(values, [x], [y]) for values in (seen, later, control_terms))
+        dx, *plant_terms = without([dx, *plant_terms], self._still)
         result = {
             **function("measure", [x], [y], ["x"], ["y"]),
             **function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
@@ -471,6 +486,8 @@ class System:
             **function("loop_control", ins, seen, names, ["u", "e", "sigma", "wished", "a_law"]),
             **function("loop_error", ins, seen[1:3], names, ["e", "sigma"]),
             **function("loop_plant", [w, x, self.u], [dx], ["w", "x", "u"], ["dx"]),
+            **self._named("loop_control", ins, control_terms, names),
+            **self._named("loop_plant", [w, x, self.u], plant_terms, ["w", "x", "u"]),
         }
         if self.tip is not None:
             at = ca.substitute(self.tip, w, self._signal_expressions)
@@ -481,6 +498,13 @@ class System:
                 **function("loop_update", [*ins, self.h], later[1:], [*names, "h"], ["z_next"]),
             }
         return result
+
+    @property
+    def _still(self) -> ca.SX:
+        """Those symbols of the base's motion that are zero whatever the numbers are: what does not move."""
+        motion = slice(3 * self.n, 3 * self.n + 3 * self.base.b.numel())
+        pairs = zip(ca.vertsplit(self.w[motion]), ca.vertsplit(self._signal_expressions[motion]), strict=True)
+        return ca.vertcat(ca.SX(0, 1), *(symbol for symbol, value in pairs if value.is_zero()))
 
     def _arm_energy(self) -> ca.SX:
         """Kinetic and potential energy of the arm with the base at rest, J."""

@@ -3,8 +3,9 @@
     with section("reaching law", "(20)"):
         size = named("size", ca.fabs(sigma))
 
-`named` gives its expression back unchanged; nothing is computed otherwise with or without it. What is named in no
-section, or not at all, is printed too, under a number.
+`named` gives its expression back unchanged. What has a name is computed as such: sums and products are put together
+anew on either side of it (symbolic/association.py), never across it. What is named in no section, or not at all, is
+printed too, under a number.
 """
 
 from __future__ import annotations

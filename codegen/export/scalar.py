@@ -89,7 +89,9 @@ class _Values(ValueGraph):
 
     def _text(self, i: int) -> str:
         """A constant in the formula of another."""
-        name, text = self.constants.get(i, (f"{self.nodes[i].value:g}", ""))
+        value = self.nodes[i].value
+        short = f"{value:g}"
+        name, text = self.constants.get(i, (short if float(short) == value else f"{value!r}", ""))
         return name or (text if text.replace("_", "").isalnum() else f"({text})")
 
     def _operation(self, op: int, arguments: tuple[int, ...], origin: str) -> int:
@@ -252,17 +254,21 @@ class ScalarPrinter:
         sources = (self._graph.nodes[i].source for i in self._given(self._wanted[name]))
         return frozenset(source for source in sources if source[0])
 
-    def body(self, name: str, load: Callable[[str, int], str], targets: Sequence[str]) -> Body:
+    def body(
+        self, name: str, load: Callable[[str, int], str], targets: Sequence[str], defined: Sequence[str] = ()
+    ) -> Body:
         """Function `name`; load(input, entry) is the C of an input ("derived" is one).
 
         targets  take its outputs, the first of them where there are more outputs than targets; "" takes none
+        defined  symbols of baked parameters that are constants of the body whether it reads them or not
         """
         wanted, labels = self._wanted[name], self._labels[name]
         if "" in targets:
             taken = [k for k, target in enumerate(targets) if target]
             wanted, labels = [wanted[k] for k in taken], [labels[k] for k in taken]
             targets = [targets[k] for k in taken]
-        return self._body(wanted, self._needed(wanted), load, targets, labels, sections=self._sections.get(name, ()))
+        sections = self._sections.get(name, ())
+        return self._body(wanted, self._needed(wanted), load, targets, labels, sections=sections, defined=defined)
 
     def derive(self, load: Callable[[str, int], str], target: str) -> Body:
         """What `functions` expect under target[0], target[1], …"""
@@ -298,6 +304,7 @@ class ScalarPrinter:
         *,
         deriving: bool = False,
         sections: Sequence[Section] = (),
+        defined: Sequence[str] = (),
     ) -> Body:
         nodes = self._graph.nodes
         lines: list[str] = []
@@ -348,6 +355,9 @@ class ScalarPrinter:
             kind = "int" if node.op in MASKS else self._real
             lines.append(f"const {kind} {names[i]} = {text};")
             ready.add(i)
+        for i, (name, _) in self._graph.constants.items():
+            if name in defined:
+                value(i)
         # What is only handed on needs no name.
         values = [given(i) if self._is_input(i) and i not in ready else value(i) for i in wanted]
         lines += [""] if sections else []

@@ -2,8 +2,9 @@
 
 Walking the frozen instruction lists, equal operations on equal arguments become one node (value numbering), so work is
 shared across Functions. Baked parameters are constants here, and exact operations on constants (+ - * / sqrt and
-comparisons, which IEEE 754 fixes to the last bit) are done; transcendental ones never are. A limit at infinity goes:
-NaN, which it would turn into infinity, stays NaN, and the loop stops at either. Nothing is regrouped.
+comparisons, which IEEE 754 fixes to the last bit) are done; transcendental ones never are. x to the power of 1 is x. A
+limit at infinity goes: NaN, which it would turn into infinity, stays NaN, and the loop stops at either. Nothing is
+regrouped.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from enum import IntEnum
 import casadi as ca
 
 from springline.codegen.program.frozen import Program
+from springline.codegen.program.operations import POWERS
 from springline.model.system import System
 
 
@@ -111,6 +113,8 @@ class ValueGraph:
                 pass  # 1/0, sqrt(-1): left to C, which knows Inf and NaN
         if op in _NO_LIMIT and nodes[1].binding is Binding.CONSTANT and nodes[1].value == _NO_LIMIT[op]:
             return arguments[0]
+        if op in POWERS and nodes[1].binding is Binding.CONSTANT and nodes[1].value == 1.0:
+            return arguments[0]
         key = (op, tuple(sorted(arguments)) if op in _COMMUTATIVE else arguments)
         varies = any(node.varies for node in nodes)
         binding = max(Binding.RUN, *(node.binding for node in nodes))
@@ -199,21 +203,15 @@ class LoopGraph(ValueGraph):
         if z:
             self.add("rates", functions["rates"], [w, s, x, *z, p, r])
             self.add("update", functions["update"], [w, s, x, *z, [self.leaf("h", 0, Binding.STATE)], p, r])
-        n, system = program.system.n, program.system
-        [seen] = self.add("measure", system.function("measure"), [x, p])
-        reference, base = [w[k * n : (k + 1) * n] for k in range(3)], w[3 * n :]
-        third = system.base.b.numel()
-        motion = [base[k * third : (k + 1) * third] for k in range(3)]
-        if system.forces:
-            motion.append(base[3 * third :])
+        system = program.system
         self.labels = {
-            "control": self._labelled(system, "control", [*reference, seen, *z, p]),
-            "plant": self._labelled(system, "plant", [*motion, x, u, p]),
-            "closed": self._labelled(system, "plant", [*motion, x, command, p]),
+            "control": self._labelled(system, "control", [w, x, *z, p]),
+            "plant": self._labelled(system, "plant", [w, x, u, p]),
+            "closed": self._labelled(system, "plant", [w, x, command, p]),
         }
 
     def _labelled(self, system: System, name: str, inputs: Sequence[Sequence[int]]) -> list[tuple[int, str]]:
-        """What the model names in Function `name` of these inputs.
+        """What the model names in Function `name` of the loop of these inputs.
 
         The Function of the names is not staged: its values are the nodes of those that are, for the operations are the
         same. What only it computes is needed by nothing, and so it is not printed.
@@ -222,7 +220,7 @@ class LoopGraph(ValueGraph):
         if not terms:
             return []
         joints = tuple(joint.name for joint in system.joints)
-        values = self.add(f"{name}_terms", system.function(f"{name}_terms"), inputs)
+        values = self.add(f"{name}_terms", system.function(f"loop_{name}_terms"), inputs)
         labels = [label for term in terms for label in term.labels(joints)]
         return list(zip((i for part in values for i in part), labels, strict=True))
 

@@ -15,7 +15,7 @@ from springline.model.control.sliding import TINY
 from springline.model.declared import column, expect_names, expect_parameters, expect_text, snake_case, symbols_of
 from springline.model.parameters import EVEN, LIMIT, POSITIVE, UNIT_OPEN, Bounds, Parameter, Values
 from springline.model.registry import Registry
-from springline.model.symbolic import over
+from springline.model.symbolic import as_written, over
 from springline.model.terms import named, of_joint
 
 LogForm = Literal["power", "base"]
@@ -66,8 +66,26 @@ class Law(ABC):
         """Wished d sigma / dt of a scalar sigma, without the limit a_max. p.<name>: its parameters, and [control]'s."""
 
 
+class OddLaw(Law):
+    """A law that asks for the same on both sides of sigma = 0. A subclass says how much: its strength."""
+
+    @abstractmethod
+    def strength(self, size: ca.SX, p: Values) -> ca.SX:
+        """Wished speed of a scalar sigma towards zero, of its size, which is no less than TINY. p: as in `rate`."""
+
+    def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
+        """Wished d sigma / dt of a scalar sigma."""
+        with as_written():
+            return self.opposing(sigma, p) * ca.sign(sigma)
+
+    def opposing(self, sigma: ca.SX, p: Values) -> ca.SX:
+        """Less the strength: the wished d sigma / dt where sigma is positive."""
+        size = named("size", ca.fmax(ca.fabs(sigma), TINY))
+        return named("a_law", -self.strength(size, p))
+
+
 @dataclass(frozen=True)
-class VariablePowerLog(Law):
+class VariablePowerLog(OddLaw):
     """-k1 f(s) - k2 L^(1+alpha) sgn s - k3 L^(1-alpha) sgn s, L = ln(epsilon |s|^nu + 1)          (18), (19), E8."""
 
     name = "variable_power_log"
@@ -81,21 +99,20 @@ class VariablePowerLog(Law):
         """With the power of a logarithm, or a logarithm to a base                                              (E8)."""
         return replace(self, log_form=log_form)
 
-    def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
-        """Wished d sigma / dt of a scalar sigma."""
-        size = named("size", ca.fmax(ca.fabs(sigma), TINY))
+    def strength(self, size: ca.SX, p: Values) -> ca.SX:
+        """k1 f + k2 L^(1+alpha) + k3 L^(1-alpha), the last two by what they have in common."""
         exponent = named("exponent", p.zeta * ca.fmax(size, 1.0) * ca.log(size))
         power = named("f", ca.exp(ca.fmin(exponent, LARGEST_EXPONENT)))
         log = named("L", ca.fmax(ca.log1p(p.epsilon_log * size**p.nu), TINY))
         if self.log_form == "power":
-            fast, slow = log * log**p.alpha, log ** (1 - p.alpha)
+            near = named("L_near", log ** (1 - p.alpha))
+            logs = near * (p.k2 * log ** (2 * p.alpha) + p.k3)
         else:
-            fast, slow = over(log, ca.log1p(p.alpha)), over(log, -ca.log1p(-p.alpha))
-        named("L_far", fast), named("L_near", slow)
-        return -(p.k1 * power + p.k2 * fast + p.k3 * slow) * ca.sign(sigma)
+            logs = log * (over(p.k2, ca.log1p(p.alpha)) - over(p.k3, ca.log1p(-p.alpha)))
+        return p.k1 * power + named("L_terms", logs)
 
 
-class DoublePower(Law):
+class DoublePower(OddLaw):
     """-k1 |s|^alpha sgn s - k2 |s|^beta sgn s                                                            (21)."""
 
     name = "double_power"
@@ -103,13 +120,12 @@ class DoublePower(Law):
     equations = "(21)"
     parameters = (K1, K2, ALPHA, BETA)
 
-    def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
-        """Wished d sigma / dt of a scalar sigma."""
-        size = named("size", ca.fmax(ca.fabs(sigma), TINY))
-        return -(p.k1 * size**p.alpha + p.k2 * size**p.beta) * ca.sign(sigma)
+    def strength(self, size: ca.SX, p: Values) -> ca.SX:
+        """k1 |s|^alpha + k2 |s|^beta."""
+        return p.k1 * size**p.alpha + p.k2 * size**p.beta
 
 
-class Power(Law):
+class Power(OddLaw):
     """-k1 |s|^alpha sgn s                                                                                (20)."""
 
     name = "power"
@@ -117,10 +133,9 @@ class Power(Law):
     equations = "(20)"
     parameters = (K1, ALPHA)
 
-    def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
-        """Wished d sigma / dt of a scalar sigma."""
-        size = named("size", ca.fmax(ca.fabs(sigma), TINY))
-        return -(p.k1 * size**p.alpha) * ca.sign(sigma)
+    def strength(self, size: ca.SX, p: Values) -> ca.SX:
+        """k1 |s|^alpha."""
+        return p.k1 * size**p.alpha
 
 
 def check_law(law: Law) -> None:
@@ -137,13 +152,20 @@ LAWS: Registry[Law] = Registry(Law, {law.name: law for law in (VariablePowerLog(
 
 
 def reaching_rate(law: Law, sigma: ca.SX, p: Values) -> tuple[ca.SX, ca.SX]:
-    """The law's d sigma / dt per joint (n x 1), limited to +-a_max (E4), and what it was before.
+    """The law's d sigma / dt per joint (n x 1), limited to +-a_max (E4), and what it was before, but for its sign.
 
     Raises ValueError for a law whose rate is no scalar of what it was given.
     """
-    rates, given = [], symbols_of(*p.values())
+    rates, wished, given = [], [], symbols_of(*p.values())
     for i, s in enumerate(ca.vertsplit(sigma)):
+        known = given | symbols_of(s)
         with of_joint(i):
-            rates.append(column(f"law {law.name}", "rate", law.rate(s, p), 1, given | symbols_of(s)))
-    wished = named("a_law", ca.vertcat(*rates))
-    return named("a", ca.fmin(ca.fmax(wished, -p.a_max), p.a_max)), wished
+            if isinstance(law, OddLaw):
+                opposing = column(f"law {law.name}", "strength", law.opposing(s, p), 1, known)
+                wished.append(opposing)
+                limited = ca.fmax(opposing, -p.a_max[i]) * ca.sign(s)  # one limit instead of two
+            else:
+                wished.append(named("a_law", column(f"law {law.name}", "rate", law.rate(s, p), 1, known)))
+                limited = ca.fmin(ca.fmax(wished[i], -p.a_max[i]), p.a_max[i])
+            rates.append(named("a", limited))
+    return ca.vertcat(*rates), ca.vertcat(*wished)

@@ -41,52 +41,54 @@ class SurfaceExponents:
                 raise ValueError(f"{name} is {value}, expected an odd integer from 1 to {LARGEST_SURFACE_EXPONENT}")
 
 
-def odd_power(e: ca.SX, exponent: Fraction) -> tuple[ca.SX, ca.SX]:
-    """sgn(e) |e|^a and its derivative a |e|^(a-1), for a > 1."""
+def growth(e: ca.SX, exponent: Fraction) -> ca.SX:
+    """|e|^(a-1) for a > 1: sgn(e) |e|^a is e times it, and the derivative of that a times it."""
     rest = exponent - 1
     if rest.denominator == 1 and rest.numerator % 2 == 0:
-        growth = ca.SX(1)
+        result = ca.SX(1)
         for _ in range(rest.numerator // 2):
-            growth = growth * e**2
-    else:
-        growth = ca.fmax(ca.fabs(e), TINY) ** float(rest)
-    return e * growth, float(exponent) * growth
+            result = result * e**2
+        return result
+    return ca.fmax(ca.fabs(e), TINY) ** float(rest)
 
 
-def terminal_term(e: ca.SX, delta: ca.SX, exponent: Fraction) -> tuple[ca.SX, ca.SX]:
-    """phi(e) = e h^((n-1)/2) with h = e^2 + delta^2, and phi'(e) = h^((n-3)/2) (n e^2 + delta^2), 0 < n < 1 (E3)."""
-    e2, d2 = e**2, delta**2
-    h = named("h", ca.fmax(e2 + d2, TINY))
+def terminal_root(e: ca.SX, delta: ca.SX, exponent: Fraction) -> tuple[ca.SX, ca.SX]:
+    """h^((n-1)/2) and h^((n-3)/2) with h = e^2 + delta^2, 0 < n < 1                                         (E3).
+
+    phi(e) is e times the first, phi'(e) the second times n e^2 + delta^2.
+    """
+    h = named("h", ca.fmax(e**2 + delta**2, TINY))
     root = h ** float((exponent - 1) / 2)
     # h^((n-3)/2) is a whole power of h^((n-1)/2) for the usual n (4 for 1/3): products instead of a second power.
     ratio = (exponent - 3) / (exponent - 1)
-    if ratio.denominator == 1 and ratio <= 8:
-        steep = ca.SX(1)
-        power, square = int(ratio), root
-        while power:
-            if power & 1:
-                steep = steep * square
-            power >>= 1
-            if power:
-                square = square**2
-    else:
-        steep = root / h
-    return e * root, steep * (float(exponent) * e2 + d2)
+    if ratio.denominator != 1 or ratio > 8:
+        return root, root / h
+    steep = ca.SX(1)
+    power, square = int(ratio), root
+    while power:
+        if power & 1:
+            steep = steep * square
+        power >>= 1
+        if power:
+            square = square**2
+    return root, steep
 
 
 def surface(e: ca.SX, de: ca.SX, p: Values, exponents: SurfaceExponents) -> tuple[ca.SX, ca.SX]:
     """Sliding variable (22) and the part of its time derivative that the control cancels in (25).
 
     e, de: tracking error and rate, n x 1. Returns sigma (n x 1, 1/s of the coordinate) and
-    de * (mu (l/m) |e|^((l-m)/m) + lambda phi'(e)).
+    de * (mu (l/m) |e|^((l-m)/m) + lambda phi'(e)). What e and de are factors of is put together before they come in.
     """
+    strong, weak = Fraction(exponents.l, exponents.m), Fraction(exponents.p, exponents.r)
     sigma, slope = [], []
     for i in range(e.numel()):
         with of_joint(i):
-            strong, strong_slope = odd_power(e[i], Fraction(exponents.l, exponents.m))
-            weak, weak_slope = terminal_term(e[i], p.delta, Fraction(exponents.p, exponents.r))
-            named("power_term", strong), named("terminal_term", weak)
-            named("power_slope", strong_slope), named("terminal_slope", weak_slope)
-        sigma.append(de[i] + p.mu[i] * strong + p["lambda"] * weak)
-        slope.append(de[i] * (p.mu[i] * strong_slope + p["lambda"] * weak_slope))
+            grown = growth(e[i], strong)
+            root, steep = terminal_root(e[i], p.delta, weak)
+            factor = named("surface_factor", p.mu[i] * grown + p["lambda"] * root)
+            terminal = (float(weak) * p["lambda"]) * e[i] ** 2 + p["lambda"] * p.delta**2
+            rate_factor = named("rate_factor", (float(strong) * p.mu[i]) * grown + steep * terminal)
+        sigma.append(de[i] + e[i] * factor)
+        slope.append(de[i] * rate_factor)
     return ca.vertcat(*sigma), ca.vertcat(*slope)

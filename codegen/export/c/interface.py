@@ -103,6 +103,7 @@ class TypedInterface:
                 "control",
                 self._load(seeing),
                 [*(f"command->{f.name}" for f in command), *seen],
+                [slot.symbol for slot in self.export.slots if self._is_asked(slot.key)],
             ),
             "plant": self._printer.body(
                 "plant",
@@ -204,6 +205,11 @@ class TypedInterface:
         """Whether a limit is a constant, and none."""
         k = [slot.key for slot in self.export.slots].index(key)
         return k not in self.export.tunable and math.isinf(self.export.values[k])
+
+    def _is_asked(self, key: str) -> bool:
+        """Whether a parameter is a limit on the reaching law, which a flag compares with."""
+        has_law = self.export.system.controller.law is not None
+        return has_law and key.startswith("control.a_max.") and not self._is_unlimited(key)
 
     def _parameter(self, key: str) -> str:
         """C of a parameter's value behind the statements of the control: its name where they define it."""

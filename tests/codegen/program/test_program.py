@@ -48,14 +48,22 @@ def call(library: ctypes.CDLL, function: ca.Function, inputs: list[NDArray[np.fl
     return results
 
 
-def inputs_of(function: ca.Function, p: NDArray[np.float64], rng: np.random.Generator) -> list[NDArray[np.float64]]:
-    """Random inputs, (SAMPLES, numbers) each; p within 20 % of the nominal values."""
-    return [
-        p * rng.uniform(0.8, 1.2, (SAMPLES, len(p)))
-        if function.name_in(i) == "p"
-        else rng.normal(size=(SAMPLES, function.numel_in(i)))
-        for i in range(function.n_in())
-    ]
+def inputs_of(
+    function: ca.Function, shaken: Program, p: NDArray[np.float64], rng: np.random.Generator
+) -> list[NDArray[np.float64]]:
+    """Random inputs, (SAMPLES, numbers) each; p within 20 % of the nominal values, r and s what follows from them."""
+    given = {"p": p * rng.uniform(0.8, 1.2, (SAMPLES, len(p)))}
+    for name in ("r", "s", *(function.name_in(i) for i in range(function.n_in()))):
+        source = {"r": "run", "s": "time"}.get(name)
+        if source in shaken.functions:
+            stage = shaken.functions[source]
+            names = [stage.name_in(i) for i in range(stage.n_in())]
+            for missing in (item for item in names if item not in given):
+                given[missing] = rng.normal(size=(SAMPLES, shaken.size(missing)))
+            given.setdefault(name, by_casadi(stage, [given[item] for item in names])[0])
+        elif name not in given:
+            given[name] = rng.normal(size=(SAMPLES, function.numel_in(function.index_in(name))))
+    return [np.ascontiguousarray(given[function.name_in(i)]) for i in range(function.n_in())]
 
 
 def by_casadi(function: ca.Function, inputs: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
@@ -118,7 +126,7 @@ def test_host_libm_gives_casadis_bits(functions: list[ca.Function], shaken: Prog
     rng = np.random.default_rng(1)
     p = values_of(shaken)
     for function in functions:
-        inputs = inputs_of(function, p, rng)
+        inputs = inputs_of(function, shaken, p, rng)
         for actual, reference in zip(call(library, function, inputs), by_casadi(function, inputs), strict=True):
             assert ((actual == reference) | (np.isnan(actual) & np.isnan(reference))).all(), function.name()
 
@@ -137,7 +145,7 @@ def test_own_mathematics_stay_within_rounding(functions: list[ca.Function], shak
     p = values_of(shaken, {"control.a_max.0": a_max, "control.a_max.1": a_max})
     worst, laws = 0.0, 0
     for function in functions:
-        inputs = inputs_of(function, p, rng)
+        inputs = inputs_of(function, shaken, p, rng)
         scale = largest_intermediates(function, inputs)[:, np.newaxis]
         results = zip(function.name_out(), call(library, function, inputs), by_casadi(function, inputs), strict=True)
         for name, *values in results:

@@ -161,33 +161,33 @@ def test_a_controller_larger_than_promised_does_not_compile(
 
 def test_a_changed_parameter_changes_its_reads_and_no_other_code(nominal: tuple[dict[str, bytes], dict]) -> None:
     old, old_manifest = nominal
-    new, new_manifest = generate_files(bind(STRUCTURE, changed("control.k1", 3.25), tunable="none"))
+    new, new_manifest = generate_files(bind(STRUCTURE, changed("control.k2", 5.25), tunable="none"))
     assert old_manifest["hash"] != new_manifest["hash"]
     for path in ("include/springline.h", "src/springline_model.h", "main.c", "self_check.c", "CMakeLists.txt"):
         assert differing_lines(old[path], new[path]) == [], path
     assert old["src/sl_math.h"] == new["src/sl_math.h"]
     model = differing_lines(old["src/springline_model.c"], new["src/springline_model.c"])
     assert {line[0] + line.split("=")[1] for line in model} == {
-        "-3.0000000000000000e+00;",
-        "+3.2500000000000000e+00;",
+        "-5.0000000000000000e+00;",
+        "+5.2500000000000000e+00;",
     }
     assert len(model) == 2 * 3  # read once in each of control, slow_control and the law
     typed = differing_lines(old["src/springline.c"], new["src/springline.c"])
     assert len(typed) == 2  # where the constant is given its name
     assert {re.sub(r" +", " ", line) for line in typed} == {
-        "- const double control_k1 = 3.0; /* SI; gain of the reaching law's first",  # goes on in the next line
-        "+ const double control_k1 = 3.25; /* SI; gain of the reaching law's first",
+        "- const double control_k2 = 5.0; /* SI; gain of the reaching law's second",  # goes on in the next line
+        "+ const double control_k2 = 5.25; /* SI; gain of the reaching law's second",
     }
     assert [line[:20] for line in differing_lines(old["README.md"], new["README.md"])] == [
-        "-| `control.k1` | 3.0 |"[:20],
-        "+| `control.k1` | 3.25 |"[:20],
+        "-| `control.k2` | 5.0 |"[:20],
+        "+| `control.k2` | 5.25 |"[:20],
     ]
     vectors = differing_lines(old["test_vectors.txt"], new["test_vectors.txt"])
     assert vectors
     assert all(line[1:].startswith("control ") for line in vectors)
     pairs = zip(old_manifest["parameters"], new_manifest["parameters"], strict=True)
     differences = [before["name"] for before, after in pairs if before != after]
-    assert differences == ["control.k1"]
+    assert differences == ["control.k2"]
 
 
 def test_a_changed_law_changes_vectors_readme_and_hash(nominal: tuple[dict[str, bytes], dict]) -> None:
