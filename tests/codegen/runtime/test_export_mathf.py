@@ -95,6 +95,57 @@ def test_accuracy_of_pow(functions: Functions) -> None:
     assert error.max() <= 1.5
 
 
+# Every float, against the C library's double: 2^31 of them where the other sign says nothing new.
+EVERYWHERE = {
+    "exp": ("exp(x)", 2**32), "expm1": ("expm1(x)", 2**32), "log": ("log(x)", 2**31), "log1p": ("log1p(x)", 2**32),
+    "sin": ("sin(x)", 2**31), "cos": ("cos(x)", 2**31), "tan": ("tan(x)", 2**31), "pow_p1_3": ("cbrt(x)", 2**31),
+    "pow_m1_3": ("1.0 / cbrt(x)", 2**31), "pow_p2_3": ("cbrt(x) * cbrt(x)", 2**31),
+    "pow_m2_3": ("1.0 / (cbrt(x) * cbrt(x))", 2**31), "pow_m1_2": ("1.0 / sqrt(x)", 2**31),
+}  # fmt: skip
+WORST = """
+#include "sl_mathf.h"
+#include <math.h>
+
+/* The largest error in units in the last place of {exact}, and where. */
+double worst(uint64_t count, uint32_t *where);
+double worst(uint64_t count, uint32_t *where) {{
+  double most = 0.0;
+  uint64_t i;
+  for (i = 0; i < count; i++) {{
+    const float argument = slf_real((uint32_t)i), got = slf_{name}(argument);
+    const double x = argument, exact = {exact};
+    double error;
+    int exponent;
+    if (isnan(exact) || isnan(got)) {{
+      error = isnan(exact) && isnan(got) ? 0.0 : HUGE_VAL;
+    }} else if (isinf(got) || fabs(exact) >= 0x1.ffffffp127) {{
+      error = (float)exact == got ? 0.0 : HUGE_VAL;
+    }} else {{
+      (void)frexp(exact, &exponent);
+      error = fabs(got - exact) * ldexp(1.0, 24 - (exponent < -125 ? -125 : exponent));
+    }}
+    if (error > most) {{
+      most = error;
+      *where = (uint32_t)i;
+    }}
+  }}
+  return most;
+}}
+"""
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", EVERYWHERE)
+def test_the_error_at_every_float(name: str) -> None:
+    exact, count = EVERYWHERE[name]
+    sources = {"worst.c": WORST.format(name=name, exact=exact), "sl_mathf.h": HEADER}
+    library = toolchain.load(toolchain.build_library(sources, main="worst.c", flags=("-std=gnu99", "-O2", "-lm")))
+    library.worst.restype, where = ctypes.c_double, ctypes.c_uint32()
+    error = library.worst(ctypes.c_uint64(count), ctypes.byref(where))
+    print(f"{name}: {error:.3f} ulp at {where.value:#010x}")
+    assert error <= BOUNDS.get(name, 1.5)
+
+
 INF, NAN = np.inf, np.nan
 
 
