@@ -21,8 +21,8 @@ PACKAGES = ("model", "codegen", "runner", "benchmarks")
 # Arrows point to what is imported; a package's own rooms stand in the order in which they build on each other.
 LAYERS = {
     "model": ("model.symbolic", "model.mechanisms", "model.control", "model.structure", "model.system"),
-    "codegen": ("codegen.files", "codegen.program", "codegen.kernel.toolchain", "codegen.kernel", "codegen.export",
-                "codegen.export.c", "codegen.export.fmu"),
+    "codegen": ("codegen.files", "codegen.elementary", "codegen.program", "codegen.kernel.toolchain", "codegen.kernel",
+                "codegen.export", "codegen.export.c", "codegen.export.fmu"),
     "runner": ("runner.files", "runner.scenario", "runner.report", "runner.run", "runner.sweep", "runner.paper",
                "runner.cli"),
 }  # fmt: skip

@@ -341,17 +341,26 @@ static inline uint32_t slf_reduce(float x, float *hi, float *lo) {
   return slf_bits(t);
 }
 
+/* Sine and cosine of r + y, |r| <= pi/4, and in *s_lo and *c_lo what their last roundings left
+ * over. */
+static inline void slf_sincos_parts(float r, float y, float *s, float *s_lo, float *c,
+                                    float *c_lo) {
+  float z = r * r, half = 0.5f * z, one = 1.0f - half, ds, dc;
+  ds = (-0x1.555556p-3f + (z * 0x1.11110ep-7f)) +
+       ((z * z) * (-0x1.a013a2p-13f + (z * 0x1.6dbbeep-19f)));
+  ds = ((half * y) - y) - ((z * r) * ds);
+  *s = r - ds;
+  *s_lo = (r - *s) - ds;
+  dc = (0x1.555554p-5f + (z * -0x1.6c12cep-10f)) + ((z * z) * 0x1.9bd67p-16f);
+  dc = ((1.0f - one) - half) + (((z * z) * dc) - (r * y));
+  *c = one + dc;
+  *c_lo = (one - *c) + dc;
+}
+
 static inline void slf_sincos(float x, float *sine, float *cosine) {
-  float r, y, z, half, s, c, one;
+  float r, y, s, c, s_lo, c_lo;
   uint32_t n = slf_reduce(x, &r, &y);
-  z = r * r;
-  half = 0.5f * z;
-  s = (-0x1.555556p-3f + (z * 0x1.11110ep-7f)) +
-      ((z * z) * (-0x1.a013a2p-13f + (z * 0x1.6dbbeep-19f)));
-  s = r - (((half * y) - y) - ((z * r) * s));
-  c = (0x1.555554p-5f + (z * -0x1.6c12cep-10f)) + ((z * z) * 0x1.9bd67p-16f);
-  one = 1.0f - half;
-  c = one + (((1.0f - one) - half) + (((z * z) * c) - (r * y)));
+  slf_sincos_parts(r, y, &s, &s_lo, &c, &c_lo);
   *sine = slf_real(slf_bits(((n & 1) != 0) ? c : s) ^ ((n << 30) & SLF_SIGN_BIT));
   *cosine = slf_real(slf_bits(((n & 1) != 0) ? s : c) ^ (((n + 1) << 30) & SLF_SIGN_BIT));
 }
@@ -368,10 +377,18 @@ static inline float slf_cos(float x) {
   return c;
 }
 
+/* The quotient of sine and cosine, or -1 over it, mended to first order by what they left over. */
 static inline float slf_tan(float x) {
-  float s, c;
-  slf_sincos(x, &s, &c);
-  return s / c;
+  float r, y, s, c, s_lo, c_lo, q;
+  uint32_t n = slf_reduce(x, &r, &y);
+  if (x == 0.0f) return x;
+  slf_sincos_parts(r, y, &s, &s_lo, &c, &c_lo);
+  if ((n & 1) != 0) {
+    q = c / s;
+    return -(q + (c_lo - q * s_lo) / s);
+  }
+  q = s / c;
+  return q + (s_lo - q * c_lo) / c;
 }
 
 /* ---- the cube-root family -----------------------------------------------------------------------

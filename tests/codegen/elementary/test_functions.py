@@ -66,7 +66,7 @@ def evaluated(program: Procedure, *inputs: np.ndarray) -> tuple[list[np.ndarray]
 
     with np.errstate(all="ignore"):
         for each in program.steps:
-            values.append(step(each.op, [values[i] for i in each.arguments], each.number))  # noqa: PERF401
+            values.append(step(each.op, [values[i] for i in each.arguments], each.number))
     fine = np.ones(inputs[0].shape, bool) if program.fine is None else values[program.fine]
     return [values[i] for i in program.results], fine
 
