@@ -6,7 +6,41 @@ from collections.abc import Sequence
 
 from springline.codegen.elementary import Kind, Op
 from springline.codegen.kernel.block import Block, Primitive
-from springline.codegen.program import literal
+from springline.codegen.program import constant_expression
+
+
+class Constants:
+    """The constants of a kernel's blocks: those of each group in memory of its own, which no compiler sees through.
+
+    So each is an operand where it is used. Constants that a compiler knows it loads into registers for several uses,
+    and with twice as many blocks of few registers that costs more than the memory does.
+    """
+
+    def __init__(self) -> None:
+        self._reals: dict[str, int] = {}
+        self._bits: dict[str, int] = {}
+
+    def real(self, value: float, group: int) -> str:
+        """C expression of a number."""
+        return f"sl_reals[{group}][{self._reals.setdefault(_static(value), len(self._reals))}]"
+
+    def bits(self, value: int, group: int) -> str:
+        """C expression of 64 bits."""
+        return f"sl_words[{group}][{self._bits.setdefault(f'UINT64_C({value:#x})', len(self._bits))}]"
+
+    def text(self, groups: int) -> list[str]:
+        """The definitions."""
+        lines = []
+        for kind, name, values in (("sl_v", "sl_reals", self._reals), ("sl_b", "sl_words", self._bits)):
+            entries = "".join(f"\n  SL_EACH({value})," for value in values)
+            size = f"{name}[SL_G][{len(values)} + 1]"
+            lines += [f"extern {kind} {size};", f"{kind} {size} = {{{', '.join(['{' + entries + '}'] * groups)}}};\n"]
+        return lines
+
+
+def _static(value: float) -> str:
+    return constant_expression(value).replace("SL_NAN", "(0.0 / 0.0)")
+
 
 _TYPES = {Kind.REAL: "sl_v", Kind.BITS: "sl_b", Kind.MASK: "sl_m"}
 _INFIX = {
@@ -30,7 +64,7 @@ _INFIX = {
 }
 
 
-def statements(block: Block, order: Sequence[int], groups: int, indent: str) -> list[str]:
+def statements(block: Block, order: Sequence[int], groups: int, constants: Constants, indent: str) -> list[str]:
     """Statements of a block in this order, for all groups side by side; `ok`, `ok_0`, ... collect where it holds."""
     nodes = block.nodes
     same: list[int] = []  # real and bits are other names of the same
@@ -49,9 +83,9 @@ def statements(block: Block, order: Sequence[int], groups: int, indent: str) -> 
         if node.op is Op.INPUT:
             return node.text.replace("@", str(g))
         if node.op is Op.REAL_CONSTANT:
-            return f"slv_set({literal(float(node.number))})"
+            return constants.real(float(node.number), g)
         if node.op is Op.BITS_CONSTANT:
-            return f"UINT64_C({int(node.number):#x})"
+            return constants.bits(int(node.number), g)
         if node.op in (Op.REAL, Op.BITS):
             return f"slv_{node.op.value[0]}({value(node.arguments[0], g)})"
         return block.labels.get(i, f"a{i}") + suffix(g)

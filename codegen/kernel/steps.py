@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from springline.codegen.kernel.block import Block, Expansion
-from springline.codegen.kernel.block_c import statements
+from springline.codegen.kernel.block_c import Constants, statements
 from springline.codegen.kernel.loop_values import LoopValues
 from springline.codegen.kernel.paying import Shape
 from springline.codegen.kernel.schedule import scheduled
@@ -69,7 +69,7 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int], Shape]
         masks = [f"ok_{g}" if chosen.groups > 1 else "ok" for g in range(chosen.groups)]
         body = "\n".join([
             *(f"  sl_m {mask} = slv_yes();" for mask in masks),
-            *statements(block, order.places, chosen.groups, "  "),
+            *statements(block, order.places, chosen.groups, constants, "  "),
             f"  return slv_all({' & '.join(masks)});",
             "}\n",
         ])  # fmt: skip
@@ -83,15 +83,22 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int], Shape]
             )
         return f"{{kernel_{functions[body]}, {tableau.when[stages[0]]}, {gain}}}"
 
-    text: list[str] = ["/* ---- a step, block by block ---- */\n", "#define SL_BLOCKED 1", PREAMBLE]
+    text: list[str] = []
+    constants = Constants()
+    later = "later" if sampled or chosen.span != "evaluation" else "closed"  # one function for all stages is short
     rows, held = [], ""
     for stages in spans:
         gain = len(gains)
-        rows.append(function(stages, builder.variants[0] if stages[0] == 0 else "later", gain))
+        rows.append(function(stages, builder.variants[0] if stages[0] == 0 else later, gain))
         if stages[0] == 0 and sampled:
             held = function(stages, "held", gain)
     fused = int(chosen.span != "evaluation")
-    text += [
+    text = [
+        "/* ---- a step, block by block ---- */\n",
+        "#define SL_BLOCKED 1",
+        PREAMBLE,
+        *constants.text(chosen.groups),
+        *text,
         f"#define SL_FUSED {fused} /* whether blocks sum up the next state, too */",
         f"enum {{ SL_BLOCKS = {len(spans)}, SL_PER_BLOCK = {len(spans[0])}, SL_GAINS = {len(gains)} }};",
         f"static const double sl_gain[SL_GAINS + 1] = {{{', '.join(map(literal, [*gains, 0.0]))}}};",
@@ -117,11 +124,10 @@ class _Builder:
         self.integrated = self.plant + (0 if sampled else self.memory)
 
     def evaluation(self, stage: int, variant: str) -> Block:
-        """The slopes of one stage, into `slope`."""
+        """The slopes of one stage, into `slope`, at what `from` points to."""
         block = Block()
-        one = not self.sampled
-        where = [block.load(f"{'x' if stage == 0 and not one else 'from'}[{k}][@]") for k in range(self.integrated)]
-        slopes = _Stages(self, block, 0 if one else stage).slopes(0 if one else stage, "closed" if one else variant if stage == 0 else "later", where)
+        where = [block.load(f"from[{k}][@]") for k in range(self.integrated)]
+        slopes = _Stages(self, block, stage).slopes(stage, variant, where)
         block.stores += [(f"slope[{k}][@]", place) for k, place in enumerate(slopes)]
         return block
 

@@ -78,6 +78,7 @@ typedef struct {
   unsigned char alive[SL_PACK];
   sl_group p[SL_NP + 1], r[SL_NR + 1];
   sl_group u[SL_NJ], e[SL_NJ], sigma[SL_NJ];
+  sl_group unseen[5][SL_NJ];
   sl_group wished[SL_NJ], a_law[SL_NJ]; /* u and the law before their limits, which turn what is no number into one */
   sl_group states[2][SL_NX];       /* x and next, in turn */
   sl_group *x, *next;              /* the state, and the next one as far as it is summed up */
@@ -303,17 +304,19 @@ static void run_stage(sl_pack *pack, int64_t k, int stage, const sl_group *from,
 static void run_block(sl_pack *pack, int64_t k, int block) {
   const sl_group *x = (const sl_group *)pack->x;
   sl_group *from = pack->at[block & 1], *to = pack->at[(block + 1) & 1], once[SL_NX];
-  int stage = block * SL_PER_BLOCK, end = stage + SL_PER_BLOCK, fine = 0, fused = 0;
+  int stage = block * SL_PER_BLOCK, end = stage + SL_PER_BLOCK, fine = 0;
 #if SL_BLOCKED
   const sl_block *chosen = SL_SAMPLED && block == 0 && k % pack->job->hold != 0 ? &SL_HELD : &sl_blocks[block];
-  sl_group *slope = sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]];
-  fused = SL_FUSED;
+  const int seen = block == 0 || SL_SAMPLED; /* what later stages compute of the control is only theirs */
   fine = chosen->compute(pack->times + chosen->instant, (const sl_v *)pack->gains + chosen->gain,
                          (double)pack->job->hold * pack->job->step, (const sl_group *)pack->p,
-                         (const sl_group *)pack->r, x, block == 0 && !SL_FUSED && !SL_SAMPLED ? x : (const sl_group *)from, pack->next, to, pack->kept, slope,
-                         pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
+                         (const sl_group *)pack->r, x, block == 0 ? x : (const sl_group *)from, pack->next, to,
+                         pack->kept, sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]],
+                         seen ? pack->u : pack->unseen[0], seen ? pack->e : pack->unseen[1],
+                         seen ? pack->sigma : pack->unseen[2], seen ? pack->wished : pack->unseen[3],
+                         seen ? pack->a_law : pack->unseen[4]);
 #endif
-  if (!SL_LIKELY(fine && fused)) {
+  if (!SL_LIKELY(fine && SL_FUSED)) {
     for (; stage < end; stage++, from = to) {
       sl_group *slope = sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]];
       if (!fine) run_stage(pack, k, stage, (const sl_group *)from, slope);

