@@ -26,8 +26,8 @@ class Shape:
 
 
 # By lanes of a vector, without and with sampled control; benchmarks/block_shapes.py measures what others take. A whole
-# step gives the processor most to do at once, but is long: with 256 bits a step with control in every stage does not fit
-# into what a processor keeps decoded (seen: Zen 3), and one evaluation that all stages share is faster.
+# step gives the processor most to do at once, but is long: with 256 bits a step with control in every stage does not
+# fit into what a processor keeps decoded (seen: Zen 3), and one evaluation that all stages share is faster.
 _SMALL: dict[int, tuple[Shape, Shape]] = {
     8: (Shape("step", 1, 2, 28), Shape("step", 2, 2, 14)),
     2: (Shape("evaluation", 2, 1, 6), Shape("step", 1, 2, 12)),
