@@ -13,7 +13,7 @@ import platform
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -226,7 +226,9 @@ def _refer(entries: list[_Entry], peak: float) -> None:
         entry.row.ratio = entry.row.ns_per_eval / measures[entry.contender.control].ns_per_eval
     if "continuous" in measures:
         row = measures["continuous"]
-        row.flops_per_eval = roofline.flops_per_evaluation(kernel(ours.DEFAULT["continuous"]))
+        row.flops_per_eval = roofline.flops_per_evaluation(
+            kernel(replace(ours.DEFAULT["continuous"], options=roofline.EVALUATIONS))
+        )
         row.roofline_share = row.flops_per_eval / row.ns_per_eval / peak
 
 

@@ -156,7 +156,7 @@ def test_operations_are_counted_in_the_machine_code(require_tool: Callable[..., 
     require_tool("objdump", "it comes with gcc, in binutils")
     counts = [
         roofline.flops_per_evaluation(
-            kernel(replace(ours.DEFAULT["continuous"], options=KernelOptions(width=width, groups=2)))
+            kernel(replace(ours.DEFAULT["continuous"], options=replace(roofline.EVALUATIONS, width=width, groups=2)))
         )
         for width in (2, 4)
     ]
