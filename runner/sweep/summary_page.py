@@ -10,9 +10,7 @@ import numpy as np
 from springline.codegen.files import render
 from springline.codegen.kernel import CHATTERING
 from springline.runner.files import value_text
-from springline.runner.report import figure_files
 from springline.runner.sweep.dataset import Dataset
-from springline.runner.sweep.figures import summary_figures
 from springline.runner.sweep.plan import Plan
 from springline.runner.sweep.summary import CHATTERED, OUTCOMES, QUANTILES, Summary, short
 
@@ -103,6 +101,9 @@ def write_summary(plan: Plan, dataset: Dataset, summary: Summary, *, plot: bool 
 
 def _write_figures(plan: Plan, dataset: Dataset, summary: Summary) -> list[str]:
     """The figures of a dataset; their names in summary.md."""
+    from springline.runner.report import figure_files  # noqa: PLC0415 - Matplotlib, which a sweep without figures spares
+    from springline.runner.sweep.figures import summary_figures  # noqa: PLC0415 - likewise
+
     names = []
     for name, figure in summary_figures(plan, summary).items():
         for file, content in figure_files(name, figure).items():

@@ -100,10 +100,10 @@ def test_a_lighter_payload_needs_a_wider_boundary_layer() -> None:
 
 
 def test_the_literal_surface_does_not_settle() -> None:
-    """delta = 0 with a_max = 200: a chatter of 0.07-0.6 m, or overflow, at any step."""
+    """delta = 0 with a_max = 200: a chatter of a tenth of a metre to one, or overflow, at any step; it is chaotic."""
     for step in (1e-4, 5e-5):
         run = seen(control__delta=0.0, simulation__step=step)
-        assert run.status != "ok" or 0.05 < run.metric("steady_state_error", "lift") < 0.8
+        assert run.status != "ok" or 0.05 < run.metric("steady_state_error", "lift") < 2.0
 
 
 def test_without_limits_the_run_leaves_its_bound_at_once() -> None:
