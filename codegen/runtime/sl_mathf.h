@@ -385,10 +385,10 @@ static inline float slf_tan(float x) {
   slf_sincos_parts(r, y, &s, &s_lo, &c, &c_lo);
   if ((n & 1) != 0) {
     q = c / s;
-    return -(q + (c_lo - q * s_lo) / s);
+    return -(q + ((c_lo - (q * s_lo)) / s));
   }
   q = s / c;
-  return q + (s_lo - q * c_lo) / c;
+  return q + ((s_lo - (q * c_lo)) / c);
 }
 
 /* ---- the cube-root family -----------------------------------------------------------------------
