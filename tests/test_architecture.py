@@ -38,6 +38,7 @@ PAST_THE_DOOR = {
     "codegen/test_one_loop.py": {"codegen.export.fmu"},  # has FMUs compiled without optimisation
     "runner/conftest.py": {"codegen.kernel", "codegen.export.c"},  # saves work that other tests look at
     "runner/cli/test_cli.py": {"runner.paper"},  # makes up what a reproduction returns
+    "runner/test_any_arm.py": {"codegen.kernel"},  # has kernels of many joints compiled without optimisation
     "runner/test_six_degrees.py": {"runner.report"},
     "runner/sweep/test_dataset.py": {"codegen.files", "runner.cli"},  # fills a disk; calls a command, to kill it
 }

@@ -6,7 +6,6 @@ from .compiled import Shape as Shape
 from .compiled import Watch as Watch
 from .compiled import kernel as kernel
 from .paying import Span as Span
-from .paying import what_pays as what_pays
 from .runs import CHATTERING as CHATTERING
 from .runs import METRICS as METRICS
 from .runs import Runs as Runs

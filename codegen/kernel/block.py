@@ -72,6 +72,11 @@ class Block:
             self.nodes.append(Primitive(op, arguments, number, text))
         return self._places[key]
 
+    @property
+    def content(self) -> object:
+        """What tells it from another block."""
+        return tuple(self.nodes), tuple(self.stores), tuple(self.fine)
+
     def load(self, text: str) -> int:
         """The place of what is loaded from memory."""
         return self.add(Op.INPUT, text=text)

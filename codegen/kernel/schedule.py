@@ -31,6 +31,7 @@ _LATENCY = {
 }
 _SLOTS = 4
 _PER_PORT = 2
+_SEEN = 64  # of what is ready, so many are looked at for one that ends lives
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,7 @@ def scheduled(block: Block, most: int) -> Order:
         for a in operands[i]:
             users[a].append(i)
     latency = {i: _LATENCY.get(nodes[i].op, 1) for i in needed}
+    port = {i: _PORTS.get(nodes[i].op, _LOGIC) for i in needed}
     rank: dict[int, int] = {}  # less is sooner: minus the longest way to the end
     for i in reversed(needed):
         rank[i] = min((rank[user] for user in users[i]), default=0) - latency[i]
@@ -74,8 +76,8 @@ def scheduled(block: Block, most: int) -> Order:
         for _ in range(_SLOTS):
             narrow = alive >= most
             found, least = -1, 1 if narrow else 2
-            for k, (_, i) in enumerate(ready):
-                if free[_PORTS.get(nodes[i].op, _LOGIC)] == 0:
+            for k, (_, i) in enumerate(ready[:_SEEN] if narrow else ready):
+                if free[port[i]] == 0:
                     continue
                 if not narrow:
                     found = k
@@ -86,11 +88,11 @@ def scheduled(block: Block, most: int) -> Order:
                     if change < 0:
                         break
             if found < 0 and narrow and not coming and ready:
-                found = next((k for k, (_, i) in enumerate(ready) if free[_PORTS.get(nodes[i].op, _LOGIC)]), -1)
+                found = next((k for k, (_, i) in enumerate(ready) if free[port[i]]), -1)
             if found < 0:
                 break
             i = ready.pop(found)[1]
-            free[_PORTS.get(nodes[i].op, _LOGIC)] -= 1
+            free[port[i]] -= 1
             order.append(i)
             for a in operands[i]:
                 uses[a] -= 1

@@ -51,11 +51,12 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int], Shape]
     builder = _Builder(values, sampled)
     tableau = values.program.system.tableau
     every = list(range(tableau.stages))
-    first = len(builder.evaluation(0, builder.variants[0]).nodes)
-    operations = first + sum(len(builder.evaluation(1, builder.variants[0]).nodes) for _ in every[1:])
+    operations = len(builder.evaluation(0, builder.variants[0]).nodes)
+    if len(every) > 1:
+        operations += len(every[1:]) * len(builder.evaluation(1, "later").nodes)
     chosen = shape(operations)
     spans = [every] if chosen.span == "step" else [[stage] for stage in every]
-    functions: dict[str, str] = {}  # body -> name: equal stages are one function
+    functions: dict[object, str] = {}  # equal stages are one function
     counts: dict[str, int] = {}
     gains: list[float] = []
 
@@ -65,23 +66,21 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int], Shape]
             block = builder.evaluation(stages[0], variant)
         else:
             block = builder.stages(stages, variant, factors)
-        order = scheduled(block, chosen.alive)
-        masks = [f"ok_{g}" if chosen.groups > 1 else "ok" for g in range(chosen.groups)]
-        body = "\n".join([
-            *(f"  sl_m {mask} = slv_yes();" for mask in masks),
-            *statements(block, order.places, chosen.groups, constants, "  "),
-            f"  return slv_all({' & '.join(masks)});",
-            "}\n",
-        ])  # fmt: skip
         gains.extend(list(factors)[len(gains) - gain :])
-        if body not in functions:
-            name = functions[body] = f"{variant}_{stages[0]}"
+        if block.content not in functions:
+            name = functions[block.content] = f"{variant}_{stages[0]}"
+            order = scheduled(block, chosen.alive)
             counts[name] = len(order.places)
-            text.append(
-                f"/* {counts[name]} operations a run, {order.alive} values at once */\n"
-                f"SL_BLOCK_FUNCTION int kernel_{name}(SL_BLOCK_ARGUMENTS) {{\n{body}"
-            )
-        return f"{{kernel_{functions[body]}, {tableau.when[stages[0]]}, {gain}}}"
+            masks = [f"ok_{g}" if chosen.groups > 1 else "ok" for g in range(chosen.groups)]
+            text.extend([
+                f"/* {counts[name]} operations a run, {order.alive} values at once */",
+                f"SL_BLOCK_FUNCTION int kernel_{name}(SL_BLOCK_ARGUMENTS) {{",
+                *(f"  sl_m {mask} = slv_yes();" for mask in masks),
+                *statements(block, order.places, chosen.groups, constants, "  "),
+                f"  return slv_all({' & '.join(masks)});",
+                "}\n",
+            ])  # fmt: skip
+        return f"{{kernel_{functions[block.content]}, {tableau.when[stages[0]]}, {gain}}}"
 
     text: list[str] = []
     constants = Constants()

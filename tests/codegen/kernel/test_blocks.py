@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from springline.codegen.elementary import Op, procedure
-from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, Runs, kernel, print_kernel, what_pays
+from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, Runs, kernel, print_kernel
 from springline.codegen.kernel.block import Block
-from springline.codegen.kernel.paying import Span
+from springline.codegen.kernel.paying import Span, what_pays
 from springline.codegen.kernel.schedule import scheduled
 from springline.codegen.program import program
 from springline.model.structure import SignalShape, Structure
