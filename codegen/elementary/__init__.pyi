@@ -1,8 +1,6 @@
-from .functions import FUNCTIONS as FUNCTIONS
 from .functions import procedure as procedure
 from .header import math_header as math_header
 from .words import COMMUTATIVE as COMMUTATIVE
 from .words import Kind as Kind
 from .words import Op as Op
 from .words import Procedure as Procedure
-from .words import Step as Step

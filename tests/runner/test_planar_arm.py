@@ -63,9 +63,7 @@ def test_other_numbers_are_refused(n):
 def test_a_mass_on_its_axis_is_refused_only_where_nothing_carries_inertia():
     assert simulate(arm(1, **{"mechanism.com": 0.0})).status == "ok"
     assert simulate(arm(1, **{"mechanism.inertia": 0.0})).status == "ok"
-    with pytest.raises(
-        InputError, match=r"mechanism: the mass matrix at the start \(joint1 = 0\) is not positive definite"
-    ):
+    with pytest.raises(InputError, match=r"mechanism: the mass matrix .*joint1 = 0\) is not positive definite"):
         arm(1, **{"mechanism.com": 0.0, "mechanism.inertia": 0.0})
 
 

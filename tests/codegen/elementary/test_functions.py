@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springline.codegen.elementary import FUNCTIONS, Op, Procedure, coefficients, math_header, procedure
+from springline.codegen.elementary import Op, Procedure, coefficients, math_header, procedure
+from springline.codegen.elementary.functions import FUNCTIONS
 from springline.codegen.kernel import toolchain
 
 ROOT = Path(__file__).parents[3]
