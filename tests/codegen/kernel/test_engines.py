@@ -312,7 +312,7 @@ def test_names_of_parts_change_nothing_but_names(
         return "}".join(found)
 
     assert statements(named.text) == statements(numbered.text)
-    assert named.text.count("dsurface_lift_0") > 2 and "dsurface" not in numbered.text
+    assert named.text.count("dsurface_lift") > 2 and "dsurface" not in numbered.text
     assert (named.sizes, named.counts) == (numbered.sizes, numbered.counts)
 
 
