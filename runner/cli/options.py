@@ -31,10 +31,12 @@ Changes = Annotated[
 ]
 
 
-def _refuse(refused: bool) -> bool:
-    from springline.runner.scenario import refuse_code
+def _refuse(context: typer.Context, refused: bool) -> bool:
+    """Refuse code until the command ends: whoever calls commands from Python goes on as before."""
+    from springline.runner.scenario import without_code
 
-    refuse_code(refused)
+    if refused:
+        context.with_resource(without_code())
     return refused
 
 

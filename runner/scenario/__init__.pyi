@@ -29,5 +29,4 @@ from .splines import kernel_tables as kernel_tables
 from .user_code import UserClass as UserClass
 from .user_code import canonical_reference as canonical_reference
 from .user_code import read_class as read_class
-from .user_code import refuse_code as refuse_code
 from .user_code import without_code as without_code

@@ -52,11 +52,6 @@ def without_code() -> Iterator[None]:
         _REFUSED.reset(before)
 
 
-def refuse_code(refused: bool) -> None:
-    """What `without_code` does, from now on."""
-    _REFUSED.set(refused)
-
-
 @dataclass(frozen=True)
 class UserClass:
     """A class of a user's file, as the file was read.

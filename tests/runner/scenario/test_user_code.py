@@ -248,6 +248,8 @@ def test_a_stranger_s_scenario_can_be_refused(folder: Path) -> None:
         code, told = springline(*command, "--no-code", "-o", folder / "out")
         assert (code, "refuses that" in told) == (2, True), told
         assert not (folder / "out").exists()
+        with pytest.raises(InputError, match="has run"):  # a command refuses for itself alone
+            load_scenario(folder / "law.toml")
 
 
 @pytest.fixture
