@@ -105,8 +105,10 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
     else:
         width = options.width or toolchain.native_vector_width(options.compiler)
 
+        alone = options.groups == 1 and options.packs == 1  # one vector waits as one lane does
+
         def shape(operations: int) -> Shape:
-            best = what_pays(width, sampled, operations)
+            best = what_pays(1 if alone else width, sampled, operations)
             return replace(
                 best,
                 span=options.span or best.span,

@@ -53,7 +53,7 @@ class KernelOptions:
             raise ValueError(f"width is {self.width}, expected a power of two")
 
 
-ONE_RUN = KernelOptions(width=2, groups=1, packs=1, span="step")
+ONE_RUN = KernelOptions(width=2, groups=1, packs=1)
 """For a run by itself: two lanes, the second repeats the first. The idle lane costs nothing, and in vector registers
 the bits of a double are at hand, without a detour through integer registers."""
 
