@@ -16,26 +16,9 @@ from springline.codegen.elementary.primitives import (
     ROUND,
     SIGN_BIT,
 )
-from springline.codegen.elementary.words import Kind, Op, Procedure, Step
+from springline.codegen.elementary.words import INFIX, Kind, Op, Procedure, Step
 
 _TYPES = {Kind.REAL: "SL_F", Kind.BITS: "SL_B", Kind.MASK: "SL_M"}
-_INFIX = {
-    Op.ADD: "+",
-    Op.SUB: "-",
-    Op.MUL: "*",
-    Op.DIV: "/",
-    Op.BIT_AND: "&",
-    Op.BIT_OR: "|",
-    Op.BIT_XOR: "^",
-    Op.BIT_ADD: "+",
-    Op.BIT_SUB: "-",
-    Op.LT: "<",
-    Op.LE: "<=",
-    Op.EQ: "==",
-    Op.NE: "!=",
-    Op.AND: "&",
-    Op.OR: "|",
-}
 _MIRRORED = {"<": ">", "<=": ">="}
 _CALLS = (
     Op.SQRT,
@@ -171,7 +154,7 @@ class Statements:
         if step.op in _CALLS:
             return f"SL_FN({step.op.value[0]})({', '.join(self._argument(each) for each in arguments)})"
         left, right = (self._operand(each) for each in arguments)
-        sign = _INFIX[step.op]
+        sign = INFIX[step.op]
         if sign in _MIRRORED and self._steps[arguments[0]].op is Op.REAL_CONSTANT:
             return f"{right} {_MIRRORED[sign]} {left}"
         return f"{left} {sign} {right}"
@@ -186,7 +169,7 @@ class Statements:
         if place in self._names:
             return self._names[place]
         text = self._text(place, step)
-        compound = step.op in _INFIX or step.op in (Op.NEG, Op.SHIFT_LEFT, Op.SHIFT_RIGHT)
+        compound = step.op in INFIX or step.op in (Op.NEG, Op.SHIFT_LEFT, Op.SHIFT_RIGHT)
         return f"({text})" if compound else text
 
 

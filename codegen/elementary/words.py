@@ -68,6 +68,25 @@ COMMUTATIVE = frozenset({
     Op.ADD, Op.MUL, Op.BIT_AND, Op.BIT_OR, Op.BIT_XOR, Op.BIT_ADD, Op.EQ, Op.NE, Op.AND, Op.OR,
 })  # fmt: skip
 
+INFIX = {
+    Op.ADD: "+",
+    Op.SUB: "-",
+    Op.MUL: "*",
+    Op.DIV: "/",
+    Op.BIT_AND: "&",
+    Op.BIT_OR: "|",
+    Op.BIT_XOR: "^",
+    Op.BIT_ADD: "+",
+    Op.BIT_SUB: "-",
+    Op.LT: "<",
+    Op.LE: "<=",
+    Op.EQ: "==",
+    Op.NE: "!=",
+    Op.AND: "&",
+    Op.OR: "|",
+}
+"""Operations that are operators between two operands in C, of scalars and of vectors."""
+
 
 @dataclass(frozen=True, slots=True)
 class Step:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from springline.codegen.elementary import Kind, Op
+from springline.codegen.elementary import INFIX, Kind, Op
 from springline.codegen.kernel.block import Block, Primitive
 from springline.codegen.program import constant_expression
 
@@ -43,25 +43,6 @@ def _static(value: float) -> str:
 
 
 _TYPES = {Kind.REAL: "sl_v", Kind.BITS: "sl_b", Kind.MASK: "sl_m"}
-_INFIX = {
-    Op.ADD: "+",
-    Op.SUB: "-",
-    Op.MUL: "*",
-    Op.DIV: "/",
-    Op.BIT_AND: "&",
-    Op.BIT_OR: "|",
-    Op.BIT_XOR: "^",
-    Op.BIT_ADD: "+",
-    Op.BIT_SUB: "-",
-    Op.SHIFT_LEFT: "<<",
-    Op.SHIFT_RIGHT: ">>",
-    Op.LT: "<",
-    Op.LE: "<=",
-    Op.EQ: "==",
-    Op.NE: "!=",
-    Op.AND: "&",
-    Op.OR: "|",
-}
 
 
 def statements(block: Block, order: Sequence[int], groups: int, constants: Constants, indent: str) -> list[str]:
@@ -109,9 +90,9 @@ def statements(block: Block, order: Sequence[int], groups: int, constants: Const
 
 def _expression(node: Primitive, operands: Sequence[str]) -> str:
     if node.op in (Op.SHIFT_LEFT, Op.SHIFT_RIGHT):
-        return f"{operands[0]} {_INFIX[node.op]} {int(node.number)}"
-    if node.op in _INFIX:
-        return f"{operands[0]} {_INFIX[node.op]} {operands[1]}"
+        return f"{operands[0]} {'<<' if node.op is Op.SHIFT_LEFT else '>>'} {int(node.number)}"
+    if node.op in INFIX:
+        return f"{operands[0]} {INFIX[node.op]} {operands[1]}"
     if node.op is Op.NEG:
         return f"-{operands[0]}"
     if node.op is Op.BELOW:
