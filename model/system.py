@@ -75,7 +75,7 @@ from springline.model.quantities import (
 )
 from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
-from springline.model.symbolic import as_written, associated, without
+from springline.model.symbolic import SYMBOLIC, as_written, associated, without
 from springline.model.terms import Term, noted
 from springline.model.tip import tip_motion
 
@@ -339,7 +339,8 @@ class System:
     @cached_property
     def arm(self) -> EquationsOfMotion:
         """The arm that moves: its equations of motion, with the plant's parameters."""
-        return equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
+        with SYMBOLIC:
+            return equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
 
     def expect_plausible(self, q: Sequence[float], values: np.ndarray) -> None:
         """Raise ValueError for masses and inertias that no body has, of the plant or of the controller's arm.
@@ -374,7 +375,8 @@ class System:
         return found[: len(values)], tuple(replace(term, value=value) for term, value in named)
 
     def _signals_of_control(self) -> ControlSignals:
-        nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal, self.arm.form)
+        with SYMBOLIC:
+            nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal, self.arm.form)
         return commanded(
             self.controller,
             self.joints,

@@ -1,5 +1,6 @@
 from .association import associated as associated
 from .counting import operations as operations
+from .linear import SYMBOLIC as SYMBOLIC
 from .linear import as_written as as_written
 from .linear import over as over
 from .linear import solve_spd as solve_spd

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import RLock
 
 import casadi as ca
+
+SYMBOLIC = RLock()
+"""Held by whoever derives expressions: CasADi's simplification is one switch for all threads."""
 
 
 @contextmanager
 def as_written() -> Iterator[None]:
     """Within this block CasADi builds expressions literally, without rewriting a * (1/b) into a / b and the like."""
-    before = ca.GlobalOptions.getSimplificationOnTheFly()
-    ca.GlobalOptions.setSimplificationOnTheFly(False)
-    try:
-        yield
-    finally:
-        ca.GlobalOptions.setSimplificationOnTheFly(before)
+    with SYMBOLIC:
+        before = ca.GlobalOptions.getSimplificationOnTheFly()
+        ca.GlobalOptions.setSimplificationOnTheFly(False)
+        try:
+            yield
+        finally:
+            ca.GlobalOptions.setSimplificationOnTheFly(before)
 
 
 def over(a: ca.SX, b: ca.SX) -> ca.SX:
