@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -75,7 +75,7 @@ from springline.model.quantities import (
 )
 from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
-from springline.model.symbolic import SYMBOLIC, as_written, associated, without
+from springline.model.symbolic import as_written, associated, derivation, derived_property, without
 from springline.model.terms import Term, noted
 from springline.model.tip import tip_motion
 
@@ -131,6 +131,7 @@ class System:
     base_motion  motion, rate and acceleration of the base, in the coordinates that are there
     """
 
+    @derivation
     def __init__(self, structure: Structure | None = None) -> None:
         self.structure = structure or Structure()
         self.mechanism: Mechanism = MECHANISMS[self.structure.mechanism].of_size(self.structure.size)
@@ -278,7 +279,7 @@ class System:
         """The disturbance, where there is one."""
         return () if self.disturbance is None else (DISTURBANCE,)
 
-    @cached_property
+    @derived_property
     def tip(self) -> ca.SX | None:
         """Position and rate of the tip by b, db, q1, dq1 and p, in the order of TIP and TIP_RATE; None without one."""
         tip = self.mechanism.tip(self.q1, self._plant)
@@ -323,7 +324,7 @@ class System:
         """Columns of a table of metrics: each for every joint."""
         return entries(METRICS, self.joints)
 
-    @cached_property
+    @derived_property
     def functions(self) -> dict[str, ca.Function]:
         """All Functions, parameters symbolic. Those of the paper's equations first, then the loop's."""
         real, signals = self.arm, self._commanded
@@ -336,12 +337,12 @@ class System:
             **self._loop(real, signals, dx),
         }
 
-    @cached_property
+    @derived_property
     def arm(self) -> EquationsOfMotion:
         """The arm that moves: its equations of motion, with the plant's parameters."""
-        with SYMBOLIC:
-            return equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
+        return equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
 
+    @derivation
     def expect_plausible(self, q: Sequence[float], values: np.ndarray) -> None:
         """Raise ValueError for masses and inertias that no body has, of the plant or of the controller's arm.
 
@@ -354,7 +355,7 @@ class System:
         """What the model calls the parts of Function `name`; they are the outputs of Function `name`_terms."""
         return self._terms.get(name, ()) if self.functions else ()
 
-    @cached_property
+    @derived_property
     def _commanded(self) -> ControlSignals:
         """What the controller computes of q1, dq1 and the rest of the state as they are."""
         with noted() as terms:
@@ -375,8 +376,7 @@ class System:
         return found[: len(values)], tuple(replace(term, value=value) for term, value in named)
 
     def _signals_of_control(self) -> ControlSignals:
-        with SYMBOLIC:
-            nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal, self.arm.form)
+        nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal, self.arm.form)
         return commanded(
             self.controller,
             self.joints,
@@ -521,6 +521,7 @@ class System:
         return self.functions[name]
 
 
+@derivation
 @lru_cache(maxsize=64)
 def system_of(structure: Structure) -> System:
     """The System of a structure; the same object for equal structures, so that its equations are derived once."""

@@ -30,7 +30,7 @@ import casadi as ca
 
 from springline.codegen.program.staging import split
 from springline.model.structure import Structure
-from springline.model.symbolic import as_written
+from springline.model.symbolic import as_written, derivation
 from springline.model.system import System, system_of
 
 
@@ -69,6 +69,7 @@ def count_operations(function: ca.Function) -> int:
     return sum(function.instruction_id(k) not in free for k in range(function.n_instructions()))
 
 
+@derivation
 @lru_cache(maxsize=64)
 def program(structure: Structure) -> Program:
     """Build, stage and freeze the Program of a structure."""

@@ -1,7 +1,8 @@
 from .association import associated as associated
 from .counting import operations as operations
-from .linear import SYMBOLIC as SYMBOLIC
-from .linear import as_written as as_written
+from .derivation import as_written as as_written
+from .derivation import derivation as derivation
+from .derivation import derived_property as derived_property
 from .linear import over as over
 from .linear import solve_spd as solve_spd
 from .normal_form import TooManyTerms as TooManyTerms

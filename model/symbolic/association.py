@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from springline.model.symbolic.linear import as_written
+from springline.model.symbolic.derivation import as_written
 from springline.model.symbolic.values import Value, listed, stacked, unstacked, written
 
 _LATENCY = {ca.OP_NEG: 1, ca.OP_FABS: 1, ca.OP_ASSIGN: 0, ca.OP_DIV: 13, ca.OP_INV: 13, ca.OP_SQRT: 20} | dict.fromkeys(

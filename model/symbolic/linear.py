@@ -1,27 +1,10 @@
-"""Symbolic arithmetic that has to stay as it is written, and the solution of small linear systems."""
+"""Quotients and the solution of small linear systems, with reciprocals that stand by themselves."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from threading import RLock
-
 import casadi as ca
 
-SYMBOLIC = RLock()
-"""Held by whoever derives expressions: CasADi's simplification is one switch for all threads."""
-
-
-@contextmanager
-def as_written() -> Iterator[None]:
-    """Within this block CasADi builds expressions literally, without rewriting a * (1/b) into a / b and the like."""
-    with SYMBOLIC:
-        before = ca.GlobalOptions.getSimplificationOnTheFly()
-        ca.GlobalOptions.setSimplificationOnTheFly(False)
-        try:
-            yield
-        finally:
-            ca.GlobalOptions.setSimplificationOnTheFly(before)
+from springline.model.symbolic.derivation import as_written
 
 
 def over(a: ca.SX, b: ca.SX) -> ca.SX:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import casadi as ca
 
-from springline.model.symbolic.linear import as_written
+from springline.model.symbolic.derivation import as_written
 from springline.model.symbolic.values import listed, stacked, unstacked, written
 
 

@@ -191,7 +191,7 @@ def _run_all(scenarios: Mapping[Key, Scenario], progress: Progress | None) -> di
     jobs: dict[Structure, dict[object, list[Key]]] = {}
     for key, scenario in scenarios.items():
         structure = _linear_structure(scenario) if key[0] == "linear" else scenario.structure()
-        program(structure)  # symbolic work belongs to one thread: CasADi's options are global
+        program(structure)  # derived here, so that threads do not wait for each other
         same = (scenario.values().tobytes(), scenario.step, scenario.steps, scenario.output_every)
         jobs.setdefault(structure, {}).setdefault(same, []).append(key)
     total = sum(len(runs) for runs in jobs.values())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,6 @@ from springline.codegen.program import program
 from springline.model.mechanisms import MECHANISMS
 from springline.model.quantities import TIP, TIP_RATE
 from springline.model.structure import SignalShape, Structure
-from springline.model.system import system_of
 from springline.runner import load_scenario, simulate
 from springline.runner.files import units
 from springline.runner.run import run_figures
@@ -73,10 +73,10 @@ def test_rows_alone_compute_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """All that a batch evaluates in its steps has as many operations as without a tip."""
     structure = Structure(base_motion=SignalShape("sine", (1, 1, 1)))
     with_tip = lanes.emit(program(structure), {})
-    monkeypatch.setattr(type(MECHANISMS[structure.mechanism]), "tip", lambda self, q, p: None)
-    program.cache_clear(), system_of.cache_clear()
-    without = lanes.emit(program(structure), {})
-    program.cache_clear(), system_of.cache_clear()
+    arm = MECHANISMS[structure.mechanism]
+    bare = type("Bare", (type(arm),), {"name": "bare", "tip": lambda self, q, p: None})
+    monkeypatch.setitem(MECHANISMS, "bare", bare())
+    without = lanes.emit(program(replace(structure, mechanism="bare")), {})
     per_step = ("closed", "control", "error", "plant", "uniform", "varying", "signals", "start")
     assert {name: with_tip.counts[name] for name in per_step} == {name: without.counts[name] for name in per_step}
     assert with_tip.counts["tip"] > 0 and "tip" not in without.counts
