@@ -205,7 +205,7 @@ def _run_all(scenarios: Mapping[Key, Scenario], progress: Progress | None) -> di
                 return
             scenario = scenarios[keys[0]]
             result = _linear(scenario) if keys[0][0] == "linear" else simulate(scenario)
-            with guard:  # CasADi again
+            with guard:
                 run = measure(scenario, result)
                 if any(key[0] == "case" for key in keys):
                     run = with_velocities(scenario, run)
