@@ -119,10 +119,12 @@ class Block:
 
 
 class Expansion:
-    """Puts values of a loop into a block; `load` gives the C expression of (value, instant) that is known before."""
+    """Puts values of a binding time into a block; `load` gives the C expression of (value, instant) known before."""
 
-    def __init__(self, block: Block, values: LoopValues, load: Callable[[int, int], str]) -> None:
-        self.block, self.loop, self.graph, self.load = block, values, values.graph, load
+    def __init__(
+        self, block: Block, values: LoopValues, load: Callable[[int, int], str], binding: Binding = Binding.STATE
+    ) -> None:
+        self.block, self.loop, self.graph, self.load, self.binding = block, values, values.graph, load, binding
 
     def values(self, wanted: Sequence[int], given: Mapping[tuple[str, int], int], instant: int) -> list[int]:
         """Places of wanted values, of inputs as `given` and signals at an instant, counted from the block's first."""
@@ -147,10 +149,10 @@ class Expansion:
                 done[i] = block.constant(node.value)
             elif node.op is None and node.source in given:
                 done[i] = given[node.source]
-            elif node.op is None or not graph.computed_at(node, Binding.STATE):
+            elif node.op is None or not graph.computed_at(node, self.binding):
                 done[i] = block.load(self.load(i, instant))
 
-        for i in graph.needed(wanted, Binding.STATE):
+        for i in graph.needed(wanted, self.binding):
             op, arguments = graph.nodes[i].op, graph.nodes[i].arguments
             assert op is not None
             for a in arguments:

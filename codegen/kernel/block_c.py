@@ -20,11 +20,11 @@ class Constants:
         self._reals: dict[str, int] = {}
         self._bits: dict[str, int] = {}
 
-    def real(self, value: float, group: int) -> str:
+    def real(self, value: float, group: str) -> str:
         """C expression of a number."""
         return f"sl_reals[{group}][{self._reals.setdefault(_static(value), len(self._reals))}]"
 
-    def bits(self, value: int, group: int) -> str:
+    def bits(self, value: int, group: str) -> str:
         """C expression of 64 bits."""
         return f"sl_words[{group}][{self._bits.setdefault(f'UINT64_C({value:#x})', len(self._bits))}]"
 
@@ -45,8 +45,13 @@ def _static(value: float) -> str:
 _TYPES = {Kind.REAL: "sl_v", Kind.BITS: "sl_b", Kind.MASK: "sl_m"}
 
 
-def statements(block: Block, order: Sequence[int], groups: int, constants: Constants, indent: str) -> list[str]:
-    """Statements of a block in this order, for all groups side by side; `ok`, `ok_0`, ... collect where it holds."""
+def statements(
+    block: Block, order: Sequence[int], groups: Sequence[str], constants: Constants, indent: str
+) -> list[str]:
+    """Statements of a block in this order, for these groups side by side; `ok`, `ok_0`, ... collect where it holds.
+
+    groups  the index of each, as C has it
+    """
     nodes = block.nodes
     same: list[int] = []  # real and bits are other names of the same
     for i, node in enumerate(nodes):
@@ -56,13 +61,13 @@ def statements(block: Block, order: Sequence[int], groups: int, constants: Const
     for place, i in block.stores:
         stores.setdefault(same[i] if same[i] in scheduled else -1, []).append((place, i))
 
-    def suffix(g: int) -> str:
-        return f"_{g}" if groups > 1 else ""
+    def suffix(g: str) -> str:
+        return f"_{g}" if len(groups) > 1 else ""
 
-    def value(i: int, g: int) -> str:
+    def value(i: int, g: str) -> str:
         node = nodes[i]
         if node.op is Op.INPUT:
-            return node.text.replace("@", str(g))
+            return node.text.replace("@", g)
         if node.op is Op.REAL_CONSTANT:
             return constants.real(float(node.number), g)
         if node.op is Op.BITS_CONSTANT:
@@ -71,19 +76,19 @@ def statements(block: Block, order: Sequence[int], groups: int, constants: Const
             return f"slv_{node.op.value[0]}({value(node.arguments[0], g)})"
         return block.labels.get(i, f"a{i}") + suffix(g)
 
-    def store(i: int, g: int) -> list[str]:
-        return [f"{indent}{place.replace('@', str(g))} = {value(k, g)};" for place, k in stores.get(i, ())]
+    def store(i: int, g: str) -> list[str]:
+        return [f"{indent}{place.replace('@', g)} = {value(k, g)};" for place, k in stores.get(i, ())]
 
     lines = []
     for i in order:
-        for g in range(groups):
+        for g in groups:
             operands = [value(k, g) for k in nodes[i].arguments]
             expression = _expression(nodes[i], operands)
             lines.append(f"{indent}const {_TYPES[nodes[i].op.kind]} {value(i, g)} = {expression};")
             if i in fine:
                 lines.append(f"{indent}ok{suffix(g)} = ok{suffix(g)} & {value(i, g)};")
             lines.extend(store(i, g))
-    for g in range(groups):
+    for g in groups:
         lines.extend(store(-1, g))  # what was only loaded
     return lines
 

@@ -111,16 +111,21 @@ class LoopValues:
             if names.get(i) == label and self.graph.nodes[k].binding is not Binding.CONSTANT:
                 names.setdefault(k, label)
 
-    def _keep(self, wanted: Sequence[int], binding: Binding) -> None:
-        """Note which values of earlier binding times a function that computes `wanted` has to be given."""
-        nodes = self.graph.nodes
+    def given(self, wanted: Sequence[int], binding: Binding) -> list[tuple[Binding, int]]:
+        """The values of earlier binding times that a function which computes `wanted` has to be given."""
+        nodes, found = self.graph.nodes, []
         inside = self.graph.needed(wanted, binding)
         for i in sorted({a for k in inside for a in nodes[k].arguments} | set(wanted)):
             node = nodes[i]
             if node.op is not None and node.binding in self.slots and not self.graph.computed_at(node, binding):
-                self.slots[node.binding].setdefault(i, len(self.slots[node.binding]))
+                found.append((node.binding, i))
             elif node.op is None and node.source[0] in ("t", "d") and binding is Binding.STATE:
-                self.slots[Binding.UNIFORM].setdefault(i, len(self.slots[Binding.UNIFORM]))
+                found.append((Binding.UNIFORM, i))
+        return found
+
+    def _keep(self, wanted: Sequence[int], binding: Binding) -> None:
+        for earlier, i in self.given(wanted, binding):
+            self.slots[earlier].setdefault(i, len(self.slots[earlier]))
 
     def assumed_power(self, exponent: int) -> float | None:
         """The special exponent that a run-time exponent has at the parameters' default values, if it has one."""

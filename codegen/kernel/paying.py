@@ -39,8 +39,8 @@ _LARGE: dict[int, tuple[Shape, Shape]] = {
     2: (Shape("evaluation", 2, 1, 6), Shape("evaluation", 2, 2, 6)),
     1: (Shape("evaluation", 1, 1, 12), Shape("evaluation", 1, 1, 12)),
 }
-_MOST = 4000
-"""Operations of a step, beyond which the kernel is large."""
+MOST = 4000
+"""Operations of a step, or of the signals of its times, beyond which a block of them is large."""
 
 
 def what_pays(width: int, sampled: bool, operations: int) -> Shape:
@@ -49,5 +49,5 @@ def what_pays(width: int, sampled: bool, operations: int) -> Shape:
     width       lanes of a vector
     operations  primitives of all evaluations of a step
     """
-    table = _SMALL if operations <= _MOST else _LARGE
+    table = _SMALL if operations <= MOST else _LARGE
     return table[max(lanes for lanes in table if lanes <= width)][sampled]

@@ -98,7 +98,7 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
         start = preamble(program, _ONE_BY_ONE, width=1, sampled=sampled, sizes=sizes)
         stages = program.system.tableau.stages
         sizes_of_steps = f"enum {{ SL_BLOCKS = {stages}, SL_PER_BLOCK = 1, SL_GAINS = 0 }};"
-        start += f"\n#define SL_BLOCKED 0\n#define SL_FUSED 0\n{sizes_of_steps}\n"
+        start += f"\n#define SL_BLOCKED 0\n#define SL_BLOCKED_TIMES 0\n#define SL_FUSED 0\n{sizes_of_steps}\n"
         parameters = tuple(slot.key for slot in slots)
         start = f"{start}\n{print_metrics(program.system)}"
         files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}

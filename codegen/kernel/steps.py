@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from springline.codegen.kernel.block import Block, Expansion
 from springline.codegen.kernel.block_c import Constants, statements
 from springline.codegen.kernel.loop_values import LoopValues
-from springline.codegen.kernel.paying import Shape
+from springline.codegen.kernel.paying import MOST, Shape
 from springline.codegen.kernel.schedule import scheduled
 from springline.codegen.program import Binding, kept_slopes, literal, updates
 
@@ -35,6 +35,11 @@ typedef struct {
   int instant, gain; /* the first it needs */
 } sl_block;
 """
+
+_TIMES_ARGUMENTS = (
+    "const double *time, const double (*data)[SL_ND + 1], const sl_time *times,\n"
+    "    const sl_group *restrict p, const sl_group *restrict r, sl_group *const *varying"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,22 +73,37 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int], Shape]
             block = builder.stages(stages, variant, factors)
         gains.extend(list(factors)[len(gains) - gain :])
         if block.content not in functions:
-            name = functions[block.content] = f"{variant}_{stages[0]}"
-            order = scheduled(block, chosen.alive)
-            counts[name] = len(order.places)
-            masks = [f"ok_{g}" if chosen.groups > 1 else "ok" for g in range(chosen.groups)]
-            text.extend([
-                f"/* {counts[name]} operations a run, {order.alive} values at once */",
-                f"SL_BLOCK_FUNCTION int kernel_{name}(SL_BLOCK_ARGUMENTS) {{",
-                *(f"  sl_m {mask} = slv_yes();" for mask in masks),
-                *statements(block, order.places, chosen.groups, constants, "  "),
-                f"  return slv_all({' & '.join(masks)});",
-                "}\n",
-            ])  # fmt: skip
+            functions[block.content] = f"{variant}_{stages[0]}"
+            define(functions[block.content], block)
         return f"{{kernel_{functions[block.content]}, {tableau.when[stages[0]]}, {gain}}}"
+
+    def begin(name: str, arguments: str, block: Block) -> Sequence[int]:
+        order = scheduled(block, chosen.alive)
+        counts[name] = len(order.places)
+        text.append(f"/* {counts[name]} operations a run, {order.alive} values at once */")
+        text.append(f"SL_BLOCK_FUNCTION int kernel_{name}({arguments}) {{")
+        return order.places
+
+    def define(name: str, block: Block) -> None:
+        order = begin(name, "SL_BLOCK_ARGUMENTS", block)
+        groups = [str(g) for g in range(chosen.groups)]
+        masks = [f"ok_{g}" if chosen.groups > 1 else "ok" for g in groups]
+        text.extend(f"  sl_m {mask} = slv_yes();" for mask in masks)
+        text.extend(statements(block, order, groups, constants, "  "))
+        text.append(f"  return slv_all({' & '.join(masks)});\n}}\n")
+
+    def define_times(block: Block) -> None:
+        order = begin("times", _TIMES_ARGUMENTS, block)
+        text.extend(["  sl_m ok = slv_yes();", "  int g;", "  for (g = 0; g < SL_G; g++) {"])
+        text.extend(statements(block, order, ["g"], constants, "    "))
+        text.append("  }\n  return slv_all(ok);\n}\n")
 
     text: list[str] = []
     constants = Constants()
+    times = builder.times()
+    blocked_times = 0 < len(times.nodes) <= MOST
+    if blocked_times:
+        define_times(times)
     later = "later" if sampled or chosen.span != "evaluation" else "closed"  # one function for all stages is short
     rows, held = [], ""
     for stages in spans:
@@ -98,6 +118,7 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int], Shape]
         PREAMBLE,
         *constants.text(chosen.groups),
         *text,
+        f"#define SL_BLOCKED_TIMES {int(blocked_times)} /* whether kernel_times has what varies at a step's times */",
         f"#define SL_FUSED {fused} /* whether blocks sum up the next state, too */",
         f"enum {{ SL_BLOCKS = {len(spans)}, SL_PER_BLOCK = {len(spans[0])}, SL_GAINS = {len(gains)} }};",
         f"static const double sl_gain[SL_GAINS + 1] = {{{', '.join(map(literal, [*gains, 0.0]))}}};",
@@ -128,6 +149,27 @@ class _Builder:
         where = [block.load(f"from[{k}][@]") for k in range(self.integrated)]
         slopes = _Stages(self, block, stage).slopes(stage, variant, where)
         block.stores += [(f"slope[{k}][@]", place) for k, place in enumerate(slopes)]
+        return block
+
+    def times(self) -> Block:
+        """What varies from run to run at the times of a step that come after its beginning; its end is the last."""
+        block, values = Block(), self.values
+        slots, last = values.slots[Binding.VARYING], sum(node < 1 for node in self.tableau.nodes)
+        inner = [i for binding, i in values.given(values.wanted["plant"], Binding.STATE) if binding is Binding.VARYING]
+
+        def load(i: int, instant: int) -> str:
+            node = values.graph.nodes[i]
+            source, k = node.source
+            if source == "t":
+                return f"slv_set(time[{instant}])"
+            return f"slv_set(data[{instant}][{k}])" if source == "d" else _given(values, i, instant)
+
+        for instant in range(last):
+            wanted = inner if self.sampled and instant < last - 1 else list(slots)  # a sample is taken at the beginning
+            places = Expansion(block, values, load, Binding.VARYING).values(wanted, {}, instant)
+            block.stores += [
+                (f"varying[{instant}][{slots[i]}][@]", place) for i, place in zip(wanted, places, strict=True)
+            ]
         return block
 
     def stages(self, stages: Sequence[int], variant: str, factors: dict[float, int]) -> Block:
@@ -206,16 +248,20 @@ class _Stages:
 
     def _load(self, i: int, instant: int) -> str:
         """C expression of what a block is given."""
-        node, slots = self.values.graph.nodes[i], self.values.slots
-        source, k = node.source
-        if source == "p":
-            return f"p[{k}][@]"
+        source, k = self.values.graph.nodes[i].source
         if source == "z":  # with sampled control: held over the step
             return f"x[{self.builder.plant + k}][@]"
-        if source == "h":
-            return "slv_set(period)"
-        if node.binding is Binding.RUN:
-            return f"r[{slots[Binding.RUN][i]}][@]"
-        if node.binding is Binding.UNIFORM:
-            return f"slv_set(times[{instant}].uniform[{slots[Binding.UNIFORM][i]} * SL_W])"
-        return f"times[{instant}].varying[{slots[Binding.VARYING][i]}][@]"
+        return "slv_set(period)" if source == "h" else _given(self.values, i, instant)
+
+
+def _given(values: LoopValues, i: int, instant: int) -> str:
+    """C expression of a parameter, or of a value of an earlier binding time."""
+    node, slots = values.graph.nodes[i], values.slots
+    source, k = node.source
+    if source == "p":
+        return f"p[{k}][@]"
+    if node.binding is Binding.RUN:
+        return f"r[{slots[Binding.RUN][i]}][@]"
+    if node.binding is Binding.UNIFORM:
+        return f"slv_set(times[{instant}].uniform[{slots[Binding.UNIFORM][i]} * SL_W])"
+    return f"times[{instant}].varying[{slots[Binding.VARYING][i]}][@]"

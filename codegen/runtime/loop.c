@@ -8,6 +8,7 @@
  *                (values bound once per run; once per time and the same for all runs; once per time and run), SL_ND,
  *                SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller has a sliding variable) 0 or 1
  *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals; kernel_tip, for rows alone, where SL_NTIP > 0
+ *   kernel_times, where SL_BLOCKED_TIMES: all that kernel_varying computes at the times of a step, in the common case
  *   the metrics: SL_METRICS_PER_JOINT, sl_sample, sl_metrics, kernel_sample, kernel_metrics_start, _sample and _finish
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
@@ -99,10 +100,16 @@ static void set_lane(sl_v *group, int lane, double value) {
   group[lane / SL_W] = slv_put(group[lane / SL_W], lane % SL_W, value);
 }
 
-static sl_time time_at(sl_pack *pack, int64_t j, sl_group *varying) {
+/* Instant j, whose signals are known for all runs, and for each after whoever has `varying` computes them. */
+static sl_time instant_at(sl_pack *pack, int64_t j, sl_group *varying) {
   sl_time now;
   now.uniform = uniform_at(pack->clock, j);
   now.varying = (const sl_group *)varying;
+  return now;
+}
+
+static sl_time time_at(sl_pack *pack, int64_t j, sl_group *varying) {
+  const sl_time now = instant_at(pack, j, varying);
   if (SL_NV > 0) {
     double d[SL_ND + 1] = {0.0}; /* likewise */
     const double t = instant_time(pack->job, j);
@@ -386,13 +393,28 @@ static int within_limits(const sl_pack *pack) {
   return slv_all(inside);
 }
 
-/* What was the end of a step becomes the beginning of step k; its control and what is observed of it. */
+/* What was the end of a step becomes the beginning of step k, and the signals at its other times become known. */
 static void begin_step(sl_pack *pack, int64_t k) {
-  sl_group *free = (sl_group *)pack->times[0].varying;
+  sl_group *varying[SL_INSTANTS];
   int m;
+  for (m = 1; m < SL_INSTANTS; m++) varying[m - 1] = pack->varying[m];
+  varying[SL_INSTANTS - 1] = (sl_group *)pack->times[0].varying;
   pack->times[0] = pack->times[SL_INSTANTS];
-  for (m = 1; m < SL_INSTANTS; m++) pack->times[m] = time_at(pack, k * SL_INSTANTS + m, pack->varying[m]);
-  pack->times[SL_INSTANTS] = time_at(pack, (k + 1) * SL_INSTANTS, free);
+#if SL_BLOCKED_TIMES
+  {
+    double t[SL_INSTANTS], d[SL_INSTANTS][SL_ND + 1] = {{0.0}}; /* likewise */
+    for (m = 1; m <= SL_INSTANTS; m++) {
+      t[m - 1] = instant_time(pack->job, k * SL_INSTANTS + m);
+      sl_table_data(pack->job->tables, SL_NTABLES, t[m - 1], d[m - 1], 1);
+      pack->times[m] = instant_at(pack, k * SL_INSTANTS + m, varying[m - 1]);
+    }
+    if (SL_LIKELY(kernel_times(t, (const double(*)[SL_ND + 1])d, pack->times + 1, (const sl_group *)pack->p,
+                               (const sl_group *)pack->r, varying))) {
+      return;
+    }
+  }
+#endif
+  for (m = 1; m <= SL_INSTANTS; m++) pack->times[m] = time_at(pack, k * SL_INSTANTS + m, varying[m - 1]);
 }
 
 static void end_step(sl_pack *pack, int64_t k, double bound) {

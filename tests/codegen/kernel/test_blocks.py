@@ -141,6 +141,32 @@ def test_large_steps_are_evaluations(width: int, sampled: bool) -> None:
         assert shape.groups * shape.alive <= (28 if width >= 8 else 12), "about the registers that there are"
 
 
+def test_times_of_a_step_have_what_is_read_there() -> None:
+    """With sampled control nothing reads the reference inside a step; a run of its own has no signals of its own."""
+    structure = Structure(base_motion=SignalShape("sine", (1, 0, 1)))
+    keys = [slot.key for slot in program(structure).system.slots]
+
+    def stored(sampled: bool, tunable: tuple[str, ...] | None) -> dict[int, int]:
+        baked = () if tunable is None else tuple(slot.default for slot in program(structure).system.slots)
+        spec = KernelSpec(structure, sampled, tunable, baked, KernelOptions(width=4, groups=1))
+        source = dict(print_kernel(program(structure), spec).files)["kernel.h"]
+        assert ("kernel_times(" in source) == ("#define SL_BLOCKED_TIMES 1" in source)
+        return {instant: len(set(re.findall(rf"varying\[{instant}\]\[(\d+)\]\[g\] =", source))) for instant in (0, 1)}
+
+    continuous, sampled = stored(False, None), stored(True, None)
+    assert continuous[0] == continuous[1] == sampled[1] > 2 * sampled[0] > 0
+    assert stored(False, ("control.delta",)) == {0: 0, 1: 0}
+    heave = tuple(key for key in keys if key.startswith("base_motion.heave"))
+    inside, end = stored(True, heave).values()
+    assert 0 < inside < end, "rows show the heave itself"
+
+
+def test_signals_of_many_terms_are_no_block() -> None:
+    structure = Structure(base_motion=SignalShape("sine", (60, 0, 60)))
+    spec = KernelSpec(structure, False, None, (), KernelOptions(width=4, groups=1))
+    assert "#define SL_BLOCKED_TIMES 0" in dict(print_kernel(program(structure), spec).files)["kernel.h"]
+
+
 def test_an_unknown_span_is_refused() -> None:
     with pytest.raises(ValueError, match=r"span is 'run', expected one of evaluation, stage, step"):
         replace(KernelOptions(), span="run")  # type: ignore[arg-type]

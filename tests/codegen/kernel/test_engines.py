@@ -246,6 +246,9 @@ def test_an_operation_without_c_is_refused_by_name(shaken: Program) -> None:
 
 RARE: dict[str, dict[str, float]] = {
     "angle beyond the fast reduction": {"initial.q.1": 3e5},
+    "signals with angles beyond the fast reduction": {
+        "reference.lift.terms.0.omega": 3e9, "base_motion.heave.0.omega": 4e9,
+    },
     "exponents other than their defaults": {"control.alpha": 0.6, "control.nu": 4.0},
     "literal law that starts on the reference": {
         "control.delta": 0.0, "initial.q.0": 0.0, "initial.q.1": 1.0,
