@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import trapezoid
 
 from springline.codegen.kernel import (
     METRICS,
@@ -135,10 +136,10 @@ def metrics_by_hand(rows: NDArray[np.float64], joint: int, settings: LoopSetting
         "settling_time": t[last] if settled else math.nan,
         "overshoot": max(0.0, (-e * np.sign(e[0])).max()),
         "steady_state_error": size[late].max(),
-        "rms_error": math.sqrt(np.trapezoid(e**2, t) / (t[-1] - t[0])),
-        "iae": np.trapezoid(size, t),
+        "rms_error": math.sqrt(trapezoid(e**2, t) / (t[-1] - t[0])),
+        "iae": trapezoid(size, t),
         "U_max": np.abs(u).max(),
-        "U_rms": math.sqrt(np.trapezoid(u**2, t) / (t[-1] - t[0])),
+        "U_rms": math.sqrt(trapezoid(u**2, t) / (t[-1] - t[0])),
         "chatter": np.abs(np.diff(second)).sum() / half / scale,
         "U_tv": np.abs(np.diff(u[last:])).sum() if settled else math.nan,
         "sigma_tv": np.abs(np.diff(sigma[last:])).sum() if settled else math.nan,

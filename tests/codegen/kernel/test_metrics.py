@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import trapezoid
 
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, Runs
 from springline.codegen.kernel import compiled as kernel_module
@@ -28,9 +29,9 @@ JOINTS = ("lift", "rotation")
 GATHERED: dict[Kind, Callable[[Floats, Floats], float]] = {
     "largest": lambda x, t: x.max(),
     "smallest": lambda x, t: x.min(),
-    "integral": np.trapezoid,
+    "integral": trapezoid,
     "variation": lambda x, t: np.abs(np.diff(x)).sum(),
-    "mean": lambda x, t: np.trapezoid(x, t) / (t[-1] - t[0]),
+    "mean": lambda x, t: trapezoid(x, t) / (t[-1] - t[0]),
 }
 
 
