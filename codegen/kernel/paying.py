@@ -25,29 +25,44 @@ class Shape:
     alive: int
 
 
-# By lanes of a vector, without and with sampled control; benchmarks/block_shapes.py measures what others take. A whole
-# step gives the processor most to do at once, but is long: with 256 bits a step with control in every stage does not
-# fit into what a processor keeps decoded (seen: Zen 3), and one evaluation that all stages share is faster.
+# By lanes of a vector, each without and with sampled control; benchmarks/block_shapes.py measures what others take, and
+# benchmarks/every_kind.py larger kernels. A whole step gives the processor most to do at once, but is long: with 256 bits
+# a step with control in every stage does not fit into what a processor keeps decoded (seen: Zen 3), and one evaluation
+# that all stages share is faster. Two vectors side by side fill the processor where one evaluation is small; where it is
+# large it has enough to do by itself, and a second vector only costs registers and room.
 _SMALL: dict[int, tuple[Shape, Shape]] = {
     8: (Shape("step", 1, 2, 28), Shape("step", 2, 2, 14)),
     2: (Shape("evaluation", 2, 1, 6), Shape("step", 1, 2, 12)),
     1: (Shape("step", 1, 1, 12), Shape("step", 1, 1, 12)),
 }
-# Evaluations of many operations have enough to do by themselves, and compilers take more than their share of time.
-_LARGE: dict[int, tuple[Shape, Shape]] = {
+_LONG: dict[int, tuple[Shape, Shape]] = {  # many stages of small evaluations: compilers take more than their share of time
     8: (Shape("evaluation", 2, 1, 14), Shape("evaluation", 2, 2, 14)),
     2: (Shape("evaluation", 2, 1, 6), Shape("evaluation", 2, 2, 6)),
     1: (Shape("evaluation", 1, 1, 12), Shape("evaluation", 1, 1, 12)),
 }
+_WIDE: dict[int, tuple[Shape, Shape]] = {  # few stages of large evaluations
+    8: (Shape("step", 1, 2, 28), Shape("step", 1, 2, 28)),
+    2: (Shape("evaluation", 1, 2, 12), Shape("evaluation", 1, 2, 12)),
+    1: (Shape("step", 1, 1, 12), Shape("step", 1, 1, 12)),
+}
+_LONG_AND_WIDE: dict[int, tuple[Shape, Shape]] = {
+    8: (Shape("evaluation", 1, 2, 28), Shape("evaluation", 1, 1, 28)),
+    2: (Shape("evaluation", 1, 2, 12), Shape("evaluation", 1, 2, 12)),
+    1: (Shape("evaluation", 1, 1, 12), Shape("evaluation", 1, 1, 12)),
+}
 MOST = 4000
-"""Operations of a step, or of the signals of its times, beyond which a block of them is large."""
+"""Operations of a step, or of the signals of its times, beyond which a block of them is long."""
+_WIDEST = 1000
+"""Operations of an evaluation, beyond which it is large: the paper's arm has 600, three joints 1,300."""
 
 
-def what_pays(width: int, sampled: bool, operations: int) -> Shape:
+def what_pays(width: int, sampled: bool, evaluation: int, step: int) -> Shape:
     """The Shape of a kernel.
 
     width       lanes of a vector
-    operations  primitives of all evaluations of a step
+    evaluation  primitives of the first evaluation of a step, with the control
+    step        of all evaluations of a step
     """
-    table = _SMALL if operations <= MOST else _LARGE
+    small, long = (_WIDE, _LONG_AND_WIDE) if evaluation > _WIDEST else (_SMALL, _LONG)
+    table = long if step > MOST else small
     return table[max(lanes for lanes in table if lanes <= width)][sampled]

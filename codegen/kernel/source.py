@@ -107,8 +107,8 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
 
         alone = options.groups == 1 and options.packs == 1  # one vector waits as one lane does
 
-        def shape(operations: int) -> Shape:
-            best = what_pays(1 if alone else width, sampled, operations)
+        def shape(evaluation: int, step: int) -> Shape:
+            best = what_pays(1 if alone else width, sampled, evaluation, step)
             return replace(
                 best,
                 span=options.span or best.span,

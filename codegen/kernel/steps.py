@@ -51,15 +51,15 @@ class Steps:
     counts: dict[str, int]
 
 
-def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int], Shape]) -> Steps:
-    """Print the blocks of a step; `shape` is asked with the operations of the evaluations of a step."""
+def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int, int], Shape]) -> Steps:
+    """Print the blocks of a step; `shape` is asked with the operations of the first evaluation and of all of a step."""
     builder = _Builder(values, sampled)
     tableau = values.program.system.tableau
     every = list(range(tableau.stages))
-    operations = len(builder.evaluation(0, builder.variants[0]).nodes)
+    operations = first = len(builder.evaluation(0, builder.variants[0]).nodes)
     if len(every) > 1:
         operations += len(every[1:]) * len(builder.evaluation(1, "later").nodes)
-    chosen = shape(operations)
+    chosen = shape(first, operations)
     spans = [every] if chosen.span == "step" else [[stage] for stage in every]
     functions: dict[object, str] = {}  # equal stages are one function
     counts: dict[str, int] = {}

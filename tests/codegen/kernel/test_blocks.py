@@ -134,10 +134,12 @@ def test_equal_stages_are_one_function() -> None:
 @pytest.mark.parametrize("sampled", [False, True])
 def test_large_steps_are_evaluations(width: int, sampled: bool) -> None:
     """A step of many operations is no block, or compilers take minutes for it."""
-    small, large = what_pays(width, sampled, 2000), what_pays(width, sampled, 30_000)
-    assert large.span == "evaluation"
+    small, large = what_pays(width, sampled, 500, 2000), what_pays(width, sampled, 500, 30_000)
+    wide, largest = what_pays(width, sampled, 1500, 3000), what_pays(width, sampled, 5000, 30_000)
+    assert large.span == largest.span == "evaluation"
     assert small.span == "step" or (width in (2, 4) and not sampled)
-    for shape in (small, large):
+    assert wide.groups == largest.groups == 1, "large evaluations fill a processor one vector at a time"
+    for shape in (small, large, wide, largest):
         assert shape.groups * shape.alive <= (28 if width >= 8 else 12), "about the registers that there are"
 
 
