@@ -1,9 +1,10 @@
 """What blocks of other shapes take: what codegen/kernel/paying.py chooses, and the choices beside it.
 
-    python -m benchmarks.block_shapes
+    python -m benchmarks.block_shapes [--kind NAME]
 
-The benchmark's arm with continuous and with sampled control, a batch and a run by itself, in every span, with one and
-two groups of vectors and packs. All kernels are called in this one process, in turn; the best of many short samples
+The benchmark's arm, or one of the kernels that `python -m benchmarks.every_kind --list` names with every parameter
+tunable, with continuous and with sampled control, a batch and a run by itself, in every span, with one and two groups
+of vectors and packs. All kernels are called in this one process, in turn; the best of many short samples
 counts, and the median of the ratios to the choice that were taken in one round.
 """
 
@@ -18,7 +19,7 @@ import time
 from dataclasses import dataclass, field, replace
 from typing import get_args
 
-from springline.benchmarks import problem
+from springline.benchmarks import every_kind, problem
 from springline.benchmarks.contenders import ours
 from springline.codegen.kernel import ONE_RUN, KernelOptions, Span, toolchain
 
@@ -40,16 +41,22 @@ class Candidate:
         self.samples.append((time.process_time() - start) * 1e9 / (steps * self.batch))
 
 
-def candidates(mode: problem.Control, one_run: bool) -> list[Candidate]:
+def candidates(kind: str, mode: problem.Control, one_run: bool) -> list[Candidate]:
     """The choice first, then every other."""
-    default, batch = ours.DEFAULT[mode], 1 if one_run else ours.BATCH
+    batch = 1 if one_run else ours.BATCH
     chosen = ONE_RUN if one_run else KernelOptions()
     groups = (1,) if one_run else (1, 2)
-    found = [Candidate("the choice", ours.build(replace(default, options=chosen)), batch)]
+
+    def build(options: KernelOptions) -> problem.Runner:
+        if not kind:
+            return ours.build(replace(ours.DEFAULT[mode], options=options))
+        work = every_kind.kernel_of(dict(every_kind.kinds())[kind], mode == "sampled", options)
+        return lambda deltas, steps: work.run(steps, len(deltas)).final_state
+
+    found = [Candidate("the choice", build(chosen), batch)]
     for span, group, pack in itertools.product(get_args(Span), groups, groups):
         options = replace(chosen, span=span, groups=group, packs=pack)
-        shape = f"{span}, {group} x {pack}"
-        found.append(Candidate(shape, ours.build(replace(default, options=options)), batch))
+        found.append(Candidate(f"{span}, {group} x {pack}", build(options), batch))
     return found
 
 
@@ -76,12 +83,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.block_shapes", description=__doc__)
     parser.add_argument("--rounds", type=int, default=100, help="samples of each kernel (default 100)")
     parser.add_argument("--sample", type=float, default=0.003, help="seconds of a sample (default 0.003)")
+    parser.add_argument("--kind", default="", choices=dict(every_kind.kinds()), help="not the benchmark's arm")
     chosen = parser.parse_args()
     width = toolchain.native_vector_width()
     sys.stdout.write(f"vectors of {width} doubles; groups of vectors x packs; ns per step and run\n")
     for mode in problem.MODES:
         for one_run in (False, True):
-            competitors = candidates(mode, one_run)
+            competitors = candidates(chosen.kind, mode, one_run)
             race(competitors, chosen.rounds, chosen.sample)
             title = f"{mode}, one run" if one_run else mode
             sys.stdout.write("\n".join(table(title, competitors)) + "\n")

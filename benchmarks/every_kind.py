@@ -14,7 +14,7 @@ import argparse
 import importlib
 import statistics
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,23 +28,30 @@ STEP = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
-class Timed:
-    """A kernel of some kind, its clock, and what it is run with."""
+class Work:
+    """A kernel of some kind, and what it is run with."""
 
     kernel: Any
-    clock: Clock
     values: Any
     settings: Any
     tables: tuple[Any, ...]
 
-    def run(self, steps: int) -> Any:
+    def run(self, steps: int, runs: int = RUNS) -> Any:
         """Simulate so many steps."""
-        return self.kernel.run(self.values, self.settings(steps, STEP, hold=10), self.tables)
+        return self.kernel.run(np.tile(self.values, (runs, 1)), self.settings(steps, STEP, hold=10), self.tables)
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """Work and its clock."""
+
+    work: Work
+    clock: Clock
 
     def sample(self, steps: int) -> float:
         """Time of a step of a run, ns."""
         self.clock.spent = 0.0
-        self.run(steps)
+        self.work.run(steps)
         return self.clock.spent * 1e9 / (steps * RUNS)
 
 
@@ -52,7 +59,7 @@ def _module(name: str) -> Any:
     return importlib.import_module(f"springline.{name}")
 
 
-def _integral_surface() -> Any:
+def _remembering() -> Any:
     """A controller with two states a joint."""
     control, quantities = _module("model.control"), _module("model.quantities")
 
@@ -90,13 +97,26 @@ def kinds() -> Iterator[tuple[str, dict[str, Any]]]:
         yield f"planar_arm, n = {n}", {**moving, "mechanism": "planar_arm", "size": n, "reference": sines}
 
 
+def kernel_of(fields: Mapping[str, Any], sampled: bool, options: Any = None) -> Work:
+    """The kernel of a structure, every parameter tunable, at the parameters' default values."""
+    kernels, program = _module("codegen.kernel"), _module("codegen.program")
+    _module("model.control").CONTROLLERS.setdefault("remembering", _remembering())
+    structure = _module("model.structure").Structure(**fields)
+    system = program.program(structure).system
+    tables = tuple(
+        program.SignalTable(0.0, 0.1, True, np.ones((40, len(each.channels), 4)) * [0.0, 0.1, 0.2, 0.3])
+        for each in system.tables
+    )
+    spec = kernels.KernelSpec(structure, sampled, options=options or kernels.KernelOptions())
+    defaults = [slot.default for slot in system.slots]
+    return Work(kernels.kernel(spec), defaults, kernels.LoopSettings, tables)
+
+
 def timed(interpreter: Path) -> dict[str, Timed]:
     """The kernels of all kinds, printed and compiled by the springline of an interpreter."""
     found: dict[str, Timed] = {}
     with packages_of(interpreter):
-        kernels, structures = _module("codegen.kernel"), _module("model.structure")
-        _module("model.control").CONTROLLERS["remembering"] = _integral_surface()
-        toolchain, clocks = kernels.toolchain, list[Clock]()
+        toolchain, clocks = _module("codegen.kernel").toolchain, list[Clock]()
         load = toolchain.load
 
         def clocked(library: Path) -> Clock:
@@ -105,30 +125,26 @@ def timed(interpreter: Path) -> dict[str, Timed]:
 
         toolchain.load = clocked
         for label, fields in kinds():
-            structure = structures.Structure(**fields)
-            system = _module("codegen.program").program(structure).system
-            table = _module("codegen.program").SignalTable
-            tables = tuple(
-                table(0.0, 0.1, True, np.ones((40, len(each.channels), 4)) * [0.0, 0.1, 0.2, 0.3])
-                for each in system.tables
-            )
-            defaults = [slot.default for slot in system.slots]
-            for sampled in (False, True):
-                loop = kernels.kernel(kernels.KernelSpec(structure, sampled))
-                mode = "sampled" if sampled else "continuous"
-                values = np.tile(defaults, (RUNS, 1))
-                found[f"{label}, {mode}"] = Timed(loop, clocks[-1], values, kernels.LoopSettings, tables)
+            for mode in ("continuous", "sampled"):
+                work = kernel_of(fields, mode == "sampled")
+                found[f"{label}, {mode}"] = Timed(work, clocks[-1])
     return found
 
 
 def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.every_kind", description=__doc__)
-    parser.add_argument("other", type=Path, help="a checkout that `make install EXTRAS=dev,bench` was run in")
+    parser.add_argument("other", type=Path, nargs="?", help="a checkout with its own `make install EXTRAS=dev,bench`")
+    parser.add_argument("--list", action="store_true", help="print the kinds and end")
     parser.add_argument("--threshold", type=float, default=1.03, help="largest ratio that is no failure (default 1.03)")
     parser.add_argument("--rounds", type=int, default=100, help="samples of each kernel (default 100)")
     parser.add_argument("--sample", type=float, default=0.0015, help="seconds of a sample (default 0.0015)")
     chosen = parser.parse_args()
+    if chosen.list:
+        sys.stdout.write("".join(f"{label}\n" for label, _ in kinds()))
+        return 0
+    if chosen.other is None:
+        parser.error("which other checkout?")
     try:
         there = timed(chosen.other / ".venv/bin/python")
     except ValueError as error:
@@ -137,7 +153,7 @@ def main() -> int:
     sys.stdout.write(f"{'ns per step and run, best':38}{'this':>9}{'other':>9}{'ratio':>8}{'median':>8}\n")
     for name, one in here.items():
         pair = (one, there[name])
-        assert set(one.run(200).status) == {0}, f"{name}: a run that ends early tells nothing"
+        assert set(one.work.run(200).status) == {0}, f"{name}: a run that ends early tells nothing"
         steps = max(1, round(chosen.sample / (min(each.sample(200) for each in pair) * RUNS * 1e-9)))
         samples: tuple[list[float], list[float]] = ([], [])
         for number in range(chosen.rounds):

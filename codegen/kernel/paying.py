@@ -25,22 +25,25 @@ class Shape:
     alive: int
 
 
-# By lanes of a vector, each without and with sampled control; benchmarks/block_shapes.py measures what others take, and
-# benchmarks/every_kind.py larger kernels. A whole step gives the processor most to do at once, but is long: with 256 bits
-# a step with control in every stage does not fit into what a processor keeps decoded (seen: Zen 3), and one evaluation
-# that all stages share is faster. Two vectors side by side fill the processor where one evaluation is small; where it is
-# large it has enough to do by itself, and a second vector only costs registers and room.
+# By lanes of a vector, each without and with sampled control; benchmarks/block_shapes.py measures what others take.
+#
+# A whole step gives the processor most to do at once, but is long: with 256 bits a step with control in every stage
+# does not fit into what a processor keeps decoded (seen: Zen 3), and one evaluation that all stages share is faster.
+# Two vectors side by side fill the processor where one evaluation is small; where it is large it has enough to do by
+# itself, and a second vector only costs registers and room.
 _SMALL: dict[int, tuple[Shape, Shape]] = {
     8: (Shape("step", 1, 2, 28), Shape("step", 2, 2, 14)),
     2: (Shape("evaluation", 2, 1, 6), Shape("step", 1, 2, 12)),
     1: (Shape("step", 1, 1, 12), Shape("step", 1, 1, 12)),
 }
-_LONG: dict[int, tuple[Shape, Shape]] = {  # many stages of small evaluations: compilers take more than their share of time
+# Many stages of small evaluations: as one block, compilers take more than their share of time.
+_LONG: dict[int, tuple[Shape, Shape]] = {
     8: (Shape("evaluation", 2, 1, 14), Shape("evaluation", 2, 2, 14)),
     2: (Shape("evaluation", 2, 1, 6), Shape("evaluation", 2, 2, 6)),
     1: (Shape("evaluation", 1, 1, 12), Shape("evaluation", 1, 1, 12)),
 }
-_WIDE: dict[int, tuple[Shape, Shape]] = {  # few stages of large evaluations
+# Few stages of large evaluations.
+_WIDE: dict[int, tuple[Shape, Shape]] = {
     8: (Shape("step", 1, 2, 28), Shape("step", 1, 2, 28)),
     2: (Shape("evaluation", 1, 2, 12), Shape("evaluation", 1, 2, 12)),
     1: (Shape("step", 1, 1, 12), Shape("step", 1, 1, 12)),

@@ -52,7 +52,10 @@ class Steps:
 
 
 def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int, int], Shape]) -> Steps:
-    """Print the blocks of a step; `shape` is asked with the operations of the first evaluation and of all of a step."""
+    """Print the blocks of a step.
+
+    shape  is asked with the operations of the first evaluation and of all evaluations of a step
+    """
     builder = _Builder(values, sampled)
     tableau = values.program.system.tableau
     every = list(range(tableau.stages))
