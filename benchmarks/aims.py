@@ -25,7 +25,7 @@ class Aim:
     wanted  one for each of COLUMNS, or one for every machine
     most    whether it is the most that is wanted, not the least
     cores   processor cores that have to be free, or the ratio says nothing of springline
-    how     what has to be asked for, or the lines are not there
+    how     what has to be asked for, or a line is not there
     """
 
     name: str
@@ -111,7 +111,7 @@ def _judged(aim: Aim, rows: dict[Line, Row], machine: dict[str, Any]) -> Judgeme
     free = machine["free_cores"]
     if math.isnan(measured):
         notes = [row.note for row in (longer, shorter) if row and row.note]
-        verdict = f"not measured: {(notes or [aim.how or 'no such line'])[0]}"
+        verdict = f"not measured: {(notes or [aim.how or 'not among the contenders'])[0]}"
     elif math.isnan(wanted):
         verdict = f"no aim for {machine['instruction_set']}"
     elif not reached and aim.cores > 1 and (free is None or free < _FREE * aim.cores):

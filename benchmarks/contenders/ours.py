@@ -129,12 +129,9 @@ def _contender(variant: str, spec: KernelSpec, *, batch: int = BATCH, threads: i
 
 
 def contenders() -> tuple[problem.Contender, ...]:
-    """Both control modes, each with the default first; arms without their control."""
+    """Both control modes, each with the default first, and plants without their control."""
     cores = os.cpu_count() or 1
-    result = [
-        problem.Contender(NAME, variant, "sampled", partial(build_plant, arm), batch=BATCH, comparable=False)
-        for variant, arm in PLANTS.items()
-    ]
+    result = []
     for mode, default in DEFAULT.items():
         free = replace(default, tunable=None, baked=())
         result.append(_contender(mode, default))
@@ -145,6 +142,10 @@ def contenders() -> tuple[problem.Contender, ...]:
             result.append(_contender(f"{mode}, {threads} threads", default, threads=threads))
         result.append(_contender(f"{mode}, one run", replace(default, options=ONE_RUN), batch=1))
         result.append(_contender(f"{mode}, casadi engine", _printed(free, engine="casadi"), batch=1))
+    result += [
+        problem.Contender(NAME, variant, "sampled", partial(build_plant, arm), batch=BATCH, comparable=False)
+        for variant, arm in PLANTS.items()
+    ]
     return tuple(result)
 
 
