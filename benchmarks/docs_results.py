@@ -25,6 +25,8 @@ def main() -> None:
     found = parser.parse_args().folder / "bench.md"
     if not found.exists():
         parser.error(f"there is no {found}: run `springline bench` first")
+    if not PAGE.is_file():
+        parser.error(f"there is no {PAGE}: run it in a checkout")
     PAGE.write_text(put(PAGE.read_text("utf-8"), NAME, found.read_text("utf-8")), encoding="utf-8")
 
 

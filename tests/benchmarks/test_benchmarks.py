@@ -343,7 +343,7 @@ def test_checkouts_that_differ_end_the_comparison_with_1(
 def test_the_page_has_the_results_as_the_benchmark_prints_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    page = docs_results.PAGE.read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "performance.md").read_text("utf-8")
     _, _, rest = page.partition(f"<!-- {docs_results.NAME}: begin -->\n")
     shown, found, _ = rest.partition(f"<!-- {docs_results.NAME}: end -->\n")
     assert found
@@ -364,8 +364,12 @@ def test_the_page_has_the_results_as_the_benchmark_prints_them(
     copy = tmp_path / "performance.md"
     copy.write_text(page, encoding="utf-8")
     (tmp_path / "bench.md").write_text("anew\n")
-    monkeypatch.setattr(docs_results, "PAGE", copy)
+    monkeypatch.setattr(docs_results, "PAGE", tmp_path / "nowhere.md")
     monkeypatch.setattr(sys, "argv", ["docs_results", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        docs_results.main()
+    assert "run it in a checkout" in capsys.readouterr().err
+    monkeypatch.setattr(docs_results, "PAGE", copy)
     docs_results.main()
     assert copy.read_text("utf-8") == page.replace(shown, "anew\n")
     monkeypatch.setattr(sys, "argv", ["docs_results", str(tmp_path / "absent")])
