@@ -209,7 +209,8 @@ def _sample(entries: list[_Entry], effort: Effort, progress: Callable[[float], N
             peak = max(peak, roof(1))
             if threaded:
                 pair = max(pair, roof(2))
-            for entry in entries:
+            # To and fro, for whoever comes after the roof finds the processor otherwise than after a neighbour.
+            for entry in entries if number % 2 else reversed(entries):
                 if number < entry.rounds:
                     entry.sample()
             progress((number + 1) / effort.rounds)
