@@ -13,7 +13,7 @@ PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-bui
 SHIPPED = $(shell find springline model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format docs-tables docs-pictures math-accuracy firmware bench clean FORCE
+.PHONY: help install reproduce test test-full lint format docs-tables docs-pictures math-accuracy firmware bench docs-bench clean FORCE
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -55,6 +55,9 @@ firmware: .venv/installed ## the controller on two microcontrollers under emulat
 bench: .venv/installed ## side by side with what one would use instead
 	$(PIP) --editable '.[bench]'
 	$(BIN)/springline bench
+
+docs-bench: bench ## measure, and put the results into docs/performance.md
+	$(BIN)/python -m benchmarks.docs_results
 
 clean: ## remove what the other verbs made; results in OUT stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

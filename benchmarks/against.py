@@ -22,18 +22,28 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from springline.benchmarks import problem
+from springline.benchmarks.contenders import ours
 
 WORK = ("continuous", "sampled", "continuous, one run", "sampled, one run")
 """Variants of springline's own contenders; every version has them."""
 
+NAME = "springline before"
+"""What the kernels of another checkout are called among the contenders."""
+
 _ROOT = "import pathlib, springline.codegen as c; print(pathlib.Path(c.__file__).parents[2])"
+
+
+def _root_of(interpreter: Path) -> str:
+    command = [str(interpreter), "-IB", "-c", _ROOT]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
 
 
 @contextmanager
@@ -42,8 +52,7 @@ def packages_of(interpreter: Path) -> Iterator[None]:
 
     Raises CalledProcessError if it cannot import it.
     """
-    command = [str(interpreter), "-IB", "-c", _ROOT]
-    root = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+    root = _root_of(interpreter)
 
     def taken() -> dict[str, object]:
         names = [name for name in sys.modules if name.partition(".")[0] == "springline"]
@@ -97,15 +106,37 @@ class Timed:
         return self.clock.spent * 1e9 / (steps * self.batch)
 
 
-def kernels(interpreter: Path) -> dict[str, Timed]:
-    """The kernels of WORK, printed and compiled by the springline of an interpreter.
+def interpreter_of(checkout: Path) -> Path:
+    """The Python of a checkout's own environment. Raises ValueError if there is none that has springline."""
+    interpreter = checkout.absolute() / ".venv" / "bin" / "python"
+    if not interpreter.exists():
+        raise ValueError(f"there is no {interpreter}: run `make install` in the other checkout")
+    try:
+        _root_of(interpreter)
+    except subprocess.CalledProcessError as error:
+        last = "".join(error.stderr.strip().splitlines()[-1:])
+        raise ValueError(f"{interpreter} cannot import springline ({last}): run `make install` there") from error
+    return interpreter
+
+
+def contenders(interpreter: Path) -> tuple[problem.Contender, ...]:
+    """The default kernels of another springline, for the benchmark; results need not have the same bits."""
+
+    def build(mode: problem.Control) -> problem.Runner:
+        return kernels(interpreter, (mode,))[mode].run
+
+    return tuple(problem.Contender(NAME, mode, mode, partial(build, mode), batch=ours.BATCH) for mode in problem.MODES)
+
+
+def kernels(interpreter: Path, variants: Collection[str] = WORK) -> dict[str, Timed]:
+    """The kernels of these variants, printed and compiled by the springline of an interpreter.
 
     Raises CalledProcessError if its springline cannot be imported, ToolchainError without a C compiler.
     """
     found = {}
     with packages_of(interpreter):
-        ours = importlib.import_module("springline.benchmarks.contenders.ours")
-        toolchain = ours.toolchain  # from where it lies in that checkout
+        theirs = importlib.import_module("springline.benchmarks.contenders.ours")
+        toolchain = theirs.toolchain  # from where it lies in that checkout
         load: Callable[[Path], ctypes.CDLL] = toolchain.load
         clocks: list[Clock] = []
 
@@ -114,8 +145,8 @@ def kernels(interpreter: Path) -> dict[str, Timed]:
             return clocks[-1]
 
         toolchain.load = clocked
-        for contender in ours.CONTENDERS:
-            if contender.variant in WORK:
+        for contender in theirs.CONTENDERS:
+            if contender.variant in variants:
                 run = contender.build()
                 found[contender.variant] = Timed(run, contender.batch, clocks[-1])
     return found
@@ -185,16 +216,13 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=1000, help="samples of each kernel (default 1000)")
     parser.add_argument("--sample", type=float, default=0.0015, help="seconds of a sample (default 0.0015)")
     chosen = parser.parse_args()
-    interpreter = chosen.other.absolute() / ".venv" / "bin" / "python"
-    if not interpreter.exists():
-        parser.error(f"there is no {interpreter}: run `make install` in the other checkout")
+    try:
+        interpreter = interpreter_of(chosen.other)
+    except ValueError as error:
+        parser.error(str(error))
     if chosen.rounds < 1 or not chosen.sample > 0.0 or not chosen.threshold > 0.0:
         parser.error("--rounds, --sample and --threshold are to be positive")
-    try:
-        races = race(interpreter, chosen.rounds, chosen.sample)
-    except subprocess.CalledProcessError as error:
-        last = error.stderr.strip().splitlines()[-1:]
-        parser.error(f"{interpreter} cannot import springline ({''.join(last)}): run `make install` there")
+    races = race(interpreter, chosen.rounds, chosen.sample)
     sys.stdout.write("\n".join(table(races)) + "\n")
     return int(any(min(one.ratios) > chosen.threshold for one in races.values()))
 

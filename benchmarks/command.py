@@ -26,29 +26,45 @@ def bench(
     only: Annotated[
         str, typer.Option(metavar="NAMES", help="Only contenders whose name contains one of these, comma-separated.")
     ] = "",
-    as_json: Annotated[bool, typer.Option("--json", help="Print the rows as JSON.")] = False,
+    before: Annotated[
+        Path | None,
+        typer.Option(metavar="CHECKOUT", help="A checkout from before a change, whose kernels are timed beside ours."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print rows and aims as JSON.")] = False,
 ) -> None:
     """Time springline and its alternatives on this machine.
 
-    Evaluations, agreement, compile times. Exit code 1 if a contender's result differs from springline's by more than
-    its tolerance.
+    Evaluations, agreement, compile times, and which of springline's aims are reached. Exit code 1 if a contender's
+    result differs from springline's by more than its tolerance.
     """
+    from springline.benchmarks.aims import judge
     from springline.benchmarks.contenders import CONTENDERS
     from springline.benchmarks.harness import QUICK, UNITS, Effort, measure
-    from springline.benchmarks.report import COLUMNS, OUTPUTS, files, machine_lines, plain, table
+    from springline.benchmarks.report import (
+        AIM_COLUMNS,
+        COLUMNS,
+        OUTPUTS,
+        aim_table,
+        files,
+        machine_lines,
+        plain,
+        table,
+    )
     from springline.runner.files import write_folder
 
     expect_folder(output)
-    chosen = _chosen(only, CONTENDERS)
+    chosen = _chosen(only, CONTENDERS) + _before(before)
     with progress("measuring", quiet=as_json) as report:
         result = measure(QUICK if quick else Effort(), chosen, report)
     write_folder(output, files(result), replaces=OUTPUTS)
     if as_json:
-        print_json("bench", [plain(row) for row in result.rows], UNITS, "ok" if result.agreed else "failed")
+        rows, aims = ([plain(one) for one in found] for found in (result.rows, judge(result)))
+        print_json("bench", rows, UNITS, "ok" if result.agreed else "failed", aims=aims)
     else:
-        print_table(COLUMNS, table(result.rows), right=COLUMNS[2:])
         for line in machine_lines(result):
             say(line)
+        print_table(COLUMNS, table(result.rows), right=COLUMNS[2:])
+        print_table(AIM_COLUMNS, aim_table(judge(result)), right=AIM_COLUMNS[1:3])
         say(f"results: {output}")
     if not result.agreed:
         raise typer.Exit(1)
@@ -70,3 +86,15 @@ def _chosen(only: str, contenders: Sequence[Contender]) -> list[Contender]:
         for contender in contenders
         if is_default(contender) or any(word in contender.name.lower() for word in words)
     ]
+
+
+def _before(checkout: Path | None) -> list[Contender]:
+    """The kernels of another checkout, if one is named."""
+    from springline.benchmarks.against import contenders, interpreter_of
+
+    if checkout is None:
+        return []
+    try:
+        return list(contenders(interpreter_of(checkout)))
+    except ValueError as error:
+        raise InputError(Problem("--before", "", str(error), str(checkout))) from error

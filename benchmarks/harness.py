@@ -40,6 +40,8 @@ UNITS = {
     "compile_cold": "s",
     "compile_cached": "s",
     "flops_per_eval": "1",
+    "wanted": "1",
+    "measured": "1",
     "roofline_share": "1",
 }
 
@@ -72,7 +74,7 @@ class Row:
     """A line of the table.
 
     ns_per_eval     time of a run, divided by 160,000 (four evaluations a step)
-    ratio           ns_per_eval over that of springline's default with the same control
+    ratio           ns_per_eval over that of springline's default with the same control, or of its plant
     batch, threads  runs in one call, cores it may use
     noise           median over best of the samples
     difference      largest difference of a state from springline's after `compared` steps, relative to max(1, |state|)
@@ -108,7 +110,7 @@ class Report:
     @property
     def agreed(self) -> bool:
         """Whether all differences are within their tolerance."""
-        return all(row.difference <= row.tolerance for row in self.rows if np.isfinite(row.ns_per_eval))
+        return all(row.difference <= row.tolerance for row in self.rows if row.compared)
 
 
 @dataclass
@@ -158,7 +160,7 @@ def measure(
             continue
         entries.append(_prepare(contender, row, reference[contender.control], effort))
         progress(0.3 * (number + 1) / len(contenders))
-    peak = _sample(entries, effort, lambda share: progress(0.3 + 0.5 * share))
+    peak, free = _sample(entries, effort, lambda share: progress(0.3 + 0.5 * share))
     for number, entry in enumerate(entries):
         best = min(entry.samples)
         entry.row.ns_per_eval, entry.row.noise = best, statistics.median(entry.samples) / best
@@ -166,7 +168,7 @@ def measure(
             entry.row.compile_cold, entry.row.compile_cached = compile_times(entry.contender)
         progress(0.8 + 0.2 * (number + 1) / len(entries))
     _refer(entries, peak)
-    return Report(fastest(rows), _machine(peak))
+    return Report(fastest(rows), _machine(peak, free))
 
 
 def _prepare(contender: problem.Contender, row: Row, reference: problem.Runner, effort: Effort) -> _Entry:
@@ -181,32 +183,40 @@ def _prepare(contender: problem.Contender, row: Row, reference: problem.Runner, 
         wanted = int(seconds / step) // problem.QUANTUM * problem.QUANTUM
         return min(max(wanted, problem.QUANTUM), problem.STEPS)
 
-    row.compared = min(effort.compared, steps_in(effort.comparison))
-    final, expected = run(delta, row.compared), reference(delta, row.compared)
-    row.difference = float(np.max(np.abs(final - expected) / np.maximum(1.0, np.abs(expected))))
-    if not row.difference <= contender.tolerance:
-        row.note = "result differs from springline's"
+    if contender.comparable:
+        row.compared = min(effort.compared, steps_in(effort.comparison))
+        final, expected = run(delta, row.compared), reference(delta, row.compared)
+        row.difference = float(np.max(np.abs(final - expected) / np.maximum(1.0, np.abs(expected))))
+        if not row.difference <= contender.tolerance:
+            row.note = "result differs from springline's"
     steps = effort.adaptive if contender.adaptive else steps_in(effort.sample)
     rounds = min(effort.rounds, max(2, int(effort.patience / (step * steps))))
     return _Entry(contender, row, run, delta, steps, rounds)
 
 
-def _sample(entries: list[_Entry], effort: Effort, progress: Callable[[float], None]) -> float:
-    """Fill the samples of all entries, round by round; returns the roof, GFLOP/s."""
+def _sample(entries: list[_Entry], effort: Effort, progress: Callable[[float], None]) -> tuple[float, float | None]:
+    """Fill the samples of all entries, round by round; returns the roof, GFLOP/s, and how many of two cores were free.
+
+    Two threads that only calculate say how many; None where no contender has threads.
+    """
     roof = roofline.build()
-    peak = 0.0
+    threaded = any(entry.contender.threads > 1 for entry in entries)
+    peak = pair = 0.0
     gc.collect()
     gc.disable()
     try:
         for number in range(effort.rounds):
-            peak = max(peak, roof())
-            for entry in entries:
+            peak = max(peak, roof(1))
+            if threaded:
+                pair = max(pair, roof(2))
+            # To and fro, for whoever comes after the roof finds the processor otherwise than after a neighbour.
+            for entry in entries if number % 2 else reversed(entries):
                 if number < entry.rounds:
                     entry.sample()
             progress((number + 1) / effort.rounds)
     finally:
         gc.enable()
-    return peak
+    return peak, pair / peak if threaded else None
 
 
 def fastest(rows: list[Row]) -> list[Row]:
@@ -221,9 +231,10 @@ def fastest(rows: list[Row]) -> list[Row]:
 
 def _refer(entries: list[_Entry], peak: float) -> None:
     """Fill in ratios to springline's defaults, and what the continuous default asks of the machine."""
-    measures = {entry.contender.variant: entry.row for entry in entries if ours.is_default(entry.contender)}
+    measures = {entry.contender.variant: entry.row for entry in entries if entry.contender.name == ours.NAME}
     for entry in entries:
-        entry.row.ratio = entry.row.ns_per_eval / measures[entry.contender.control].ns_per_eval
+        measure = measures[entry.contender.variant.partition(",")[0]]
+        entry.row.ratio = entry.row.ns_per_eval / measure.ns_per_eval
     if "continuous" in measures:
         row = measures["continuous"]
         row.flops_per_eval = roofline.flops_per_evaluation(
@@ -232,7 +243,7 @@ def _refer(entries: list[_Entry], peak: float) -> None:
         row.roofline_share = row.flops_per_eval / row.ns_per_eval / peak
 
 
-def _machine(peak: float) -> dict[str, Any]:
+def _machine(peak: float, free: float | None) -> dict[str, Any]:
     """What the numbers belong to."""
     compiler = toolchain.find_compiler()
     info = Path("/proc/cpuinfo")
@@ -241,8 +252,10 @@ def _machine(peak: float) -> dict[str, Any]:
     return {
         "processor": models[0] if models else platform.processor(),
         "cores": os.cpu_count(),
+        "instruction_set": toolchain.native_instruction_set(compiler),
         "vector_width": toolchain.native_vector_width(compiler),
         "peak_gflops": peak,
+        "free_cores": free,
         "versions": {
             compiler.family: compiler.version,
             "Python": platform.python_version(),

@@ -60,12 +60,14 @@ def deltas(runs: int) -> Floats:
 class Contender:
     """One way to do the work.
 
-    name, variant  what it is called in the table; the variant begins with the control mode
+    name, variant  what it is called in the table; the variant begins with what its ratio refers to: the control mode
+                   for whatever does this work
     build          generate, compile, return a Runner: what a user waits for before the first result
     batch          runs that one call takes on
     threads        processor cores that it may use
     modules        packages that it needs besides springline's own
     compiles       whether it has a compiler to wait for (timed with continuous control)
+    comparable     whether it does this work, so that its states are compared with springline's
     adaptive       chooses its own steps, so that its time is that of the whole duration, not of so many steps
     tolerance      largest difference of a state from springline's over the compared steps, relative to max(1, |state|)
     """
@@ -78,6 +80,7 @@ class Contender:
     threads: int = 1
     modules: tuple[str, ...] = ()
     compiles: bool = False
+    comparable: bool = True
     adaptive: bool = False
     tolerance: float = 1e-9
 

@@ -11,6 +11,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from springline.benchmarks.aims import Judgement, judge
 from springline.benchmarks.harness import UNITS, Report, Row
 from springline.benchmarks.problem import MODES, STAGES, STEPS
 from springline.runner.report import PAGE, figure_files, house_style
@@ -19,6 +20,8 @@ OUTPUTS = ("bench.json", "bench.md", "bench.png", "bench.svg")
 """What a benchmark leaves in its folder."""
 
 COLUMNS = ("contender", "variant", "ns", "ratio", "ms a run", "difference", "compile", "cached", "noise")
+
+AIM_COLUMNS = ("aim, longer over shorter time", "wanted", "measured", "verdict")
 
 _OURS, _THEIRS = "#0072B2", "#999999"
 
@@ -41,12 +44,26 @@ def table(rows: Sequence[Row]) -> list[list[str]]:
     ]
 
 
+def aim_table(judgements: Sequence[Judgement]) -> list[list[str]]:
+    """The aims as text, in the order of AIM_COLUMNS."""
+    return [
+        [
+            one.aim,
+            f"{one.bound} {_text(one.wanted)}" if math.isfinite(one.wanted) else "–",
+            _text(one.measured),
+            one.verdict,
+        ]
+        for one in judgements
+    ]
+
+
 def machine_lines(report: Report) -> list[str]:
     """What the numbers belong to, for people."""
     machine = report.machine
+    width = machine["vector_width"]
     lines = [
-        f"{machine['processor']}, {machine['cores']} cores, vectors of {machine['vector_width']} doubles, "
-        f"at most {machine['peak_gflops']:.3g} GFLOP/s a core",
+        f"{machine['processor']}, {machine['cores']} cores, {machine['instruction_set']}, "
+        f"vectors of {width} doubles (W = {width}), at most {machine['peak_gflops']:.3g} GFLOP/s a core",
         ", ".join(f"{name} {number}" for name, number in machine["versions"].items()),
     ]
     lines += [
@@ -59,8 +76,13 @@ def machine_lines(report: Report) -> list[str]:
 
 
 def files(report: Report) -> dict[str, bytes]:
-    """bench.json (machine, rows, units), the table in Markdown, and the bar chart, by file name."""
-    content = {"machine": report.machine, "rows": [plain(row) for row in report.rows], "units": UNITS}
+    """bench.json (machine, rows, aims, units), the tables in Markdown, and the bar chart, by file name."""
+    content = {
+        "machine": report.machine,
+        "rows": [plain(row) for row in report.rows],
+        "aims": [plain(one) for one in judge(report)],
+        "units": UNITS,
+    }
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return {
         "bench.json": text.encode(),
@@ -70,13 +92,16 @@ def files(report: Report) -> dict[str, bytes]:
 
 
 def markdown(report: Report) -> str:
-    """Machine and table as Markdown."""
-    lines = [COLUMNS, ["---"] * 2 + ["---:"] * (len(COLUMNS) - 2), *table(report.rows)]
-    rows = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-    return "\n\n".join(machine_lines(report)) + f"\n\n{rows}\n"
+    """Machine, table and aims as Markdown."""
+    tables = (
+        [COLUMNS, ["---"] * 2 + ["---:"] * (len(COLUMNS) - 2), *table(report.rows)],
+        [AIM_COLUMNS, ["---", "---:", "---:", "---"], *aim_table(judge(report))],
+    )
+    shown = ["\n".join("| " + " | ".join(line) + " |" for line in lines) for lines in tables]
+    return "\n\n".join([*machine_lines(report), *shown]) + "\n"
 
 
-def plain(row: Row) -> dict[str, Any]:
+def plain(row: Row | Judgement) -> dict[str, Any]:
     """A row for JSON, NaN as null."""
     return {
         key: None if isinstance(value, float) and math.isnan(value) else value for key, value in asdict(row).items()

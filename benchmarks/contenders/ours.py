@@ -1,4 +1,4 @@
-"""Springline itself: vector widths, everything tunable, all threads, a single run, and the casadi engine."""
+"""Springline itself: vector widths, everything tunable, threads, a single run, the casadi engine, plants alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 
 from springline.benchmarks import problem
-from springline.codegen.kernel import ONE_RUN, KernelOptions, KernelSpec, LoopSettings, best_flags, kernel, toolchain
+from springline.codegen.kernel import (
+    ONE_RUN,
+    STATUS,
+    KernelOptions,
+    KernelSpec,
+    LoopSettings,
+    best_flags,
+    kernel,
+    toolchain,
+)
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 
@@ -20,6 +29,15 @@ STRUCTURE = Structure(base_motion=SignalShape("sine", (1, 0, 0)))
 # Two packs of the widest kernel (8 lanes, two groups), so that no kernel idles lanes.
 BATCH = 32
 WIDTHS = (1, 2, 4, 8)
+
+PLANT, SEVEN = "plant", "plant, planar_arm of 7 links"
+PLANTS = {
+    PLANT: STRUCTURE,
+    SEVEN: Structure(
+        mechanism="planar_arm", size=7, reference=SignalShape("sine", (1,) * 7), base_motion=STRUCTURE.base_motion
+    ),
+}
+"""Arms of which the plant is timed alone, on the same base, by variant."""
 
 _VALUES = {
     "reference.lift.terms.0.amplitude": 1.0,
@@ -34,8 +52,13 @@ _VALUES = {
 }
 
 
-VALUES = {slot.key: _VALUES.get(slot.key, slot.default) for slot in System(STRUCTURE).slots}
-"""Every number of the system by its slot key: springline's defaults are the paper's."""
+def values(structure: Structure) -> dict[str, float]:
+    """Every number of a system by its slot key: springline's defaults are the paper's."""
+    return {slot.key: _VALUES.get(slot.key, slot.default) for slot in System(structure).slots}
+
+
+VALUES = values(STRUCTURE)
+"""Those of the benchmark's arm."""
 
 DEFAULT: dict[problem.Control, KernelSpec] = {
     mode: KernelSpec(STRUCTURE, mode == "sampled", ("control.delta",), tuple(VALUES.values())) for mode in problem.MODES
@@ -43,24 +66,33 @@ DEFAULT: dict[problem.Control, KernelSpec] = {
 """One varied parameter, all others baked; the machine's vector width, and as many groups as pay."""
 
 
-def build(spec: KernelSpec, threads: int = 1) -> problem.Runner:
+def build(spec: KernelSpec, threads: int = 1, hold: int = 1) -> problem.Runner:
     """Runs are dealt to threads in equal parts; the loop releases the GIL."""
-    loop = kernel(spec)
+    loop, known = kernel(spec), values(spec.structure)
     column = loop.parameters.index("control.delta")
+    pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def run_part(delta: problem.Floats, steps: int) -> problem.Floats:
-        parameters = np.tile([VALUES[key] for key in loop.parameters], (delta.size, 1))
+        parameters = np.tile([known[key] for key in loop.parameters], (delta.size, 1))
         parameters[:, column] = delta
-        return loop.run(parameters, LoopSettings(steps, problem.STEP)).final_state
+        runs = loop.run(parameters, LoopSettings(steps, problem.STEP, hold=hold))
+        if np.any(runs.status):
+            raise RuntimeError(f"a run ended early, {STATUS[runs.status.max()]}: its time says nothing")
+        return runs.final_state
 
     def run(delta: problem.Floats, steps: int) -> problem.Floats:
-        if threads == 1:
+        if pool is None:
             return run_part(delta, steps)
-        with ThreadPoolExecutor(threads) as pool:
-            parts = pool.map(lambda part: run_part(part, steps), np.array_split(delta, threads))
+        parts = pool.map(lambda part: run_part(part, steps), np.array_split(delta, threads))
         return np.concatenate(list(parts))
 
     return run
+
+
+def build_plant(structure: Structure) -> problem.Runner:
+    """An arm under the command of its first sample: the law is evaluated once a run, the plant in every stage."""
+    spec = KernelSpec(structure, True, ("control.delta",), tuple(values(structure).values()))
+    return build(spec, hold=problem.STEPS)
 
 
 def build_fused(mode: problem.Control) -> problem.Runner:
@@ -97,7 +129,7 @@ def _contender(variant: str, spec: KernelSpec, *, batch: int = BATCH, threads: i
 
 
 def contenders() -> tuple[problem.Contender, ...]:
-    """Both control modes, each with the default first."""
+    """Both control modes, each with the default first, and plants without their control."""
     cores = os.cpu_count() or 1
     result = []
     for mode, default in DEFAULT.items():
@@ -106,10 +138,14 @@ def contenders() -> tuple[problem.Contender, ...]:
         result += [_contender(f"{mode}, W = {width}", _printed(default, width=width)) for width in WIDTHS]
         result.append(_contender(f"{mode}, all tunable", free))
         result.append(problem.Contender(NAME, f"{mode}, FMA allowed", mode, partial(build_fused, mode), batch=BATCH))
-        if cores > 1:
-            result.append(_contender(f"{mode}, {cores} threads", default, threads=cores))
+        for threads in sorted({2, cores}) if cores > 1 else ():
+            result.append(_contender(f"{mode}, {threads} threads", default, threads=threads))
         result.append(_contender(f"{mode}, one run", replace(default, options=ONE_RUN), batch=1))
         result.append(_contender(f"{mode}, casadi engine", _printed(free, engine="casadi"), batch=1))
+    result += [
+        problem.Contender(NAME, variant, "sampled", partial(build_plant, arm), batch=BATCH, comparable=False)
+        for variant, arm in PLANTS.items()
+    ]
     return tuple(result)
 
 

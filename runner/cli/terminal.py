@@ -120,7 +120,7 @@ def _column_widths(
 
 
 def print_json(
-    command: str, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str], status: str = "ok", **more: str
+    command: str, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str], status: str = "ok", **more: object
 ) -> None:
     """The one JSON object of a command on stdout, `more` after what every command has.
 

@@ -23,7 +23,7 @@ from springline.runner.files import InputError, Problem
 from springline.runner.paper.cases import LAWS, cases
 from springline.runner.paper.evidence import Evidence, Theory
 from springline.runner.paper.measured import Floats, Measured
-from springline.runner.run import Crew, Progress, Result, results, simulate, trajectory_schema
+from springline.runner.run import Crew, Progress, Result, results, simulate, trajectory_table
 from springline.runner.scenario import Scenario, load_scenario
 
 Overrides = Mapping[str, Any]
@@ -317,7 +317,4 @@ def _linear(scenario: Scenario) -> Result:
     settings = LoopSettings(scenario.steps, scenario.step, scenario.bound, output_every=scenario.output_every)
     runs = kernel(KernelSpec(structure, options=ONE_RUN)).run(values[None, :], settings)
     assert runs.trajectory is not None
-    trajectory = pa.Table.from_arrays(
-        [pa.array(column) for column in runs.trajectory[0].T], schema=trajectory_schema(system)
-    )
-    return Result(trajectory, pa.table({"status": ["ok"]}), "ok", "")
+    return Result(trajectory_table(system, runs.trajectory[0]), pa.table({"status": ["ok"]}), "ok", "")

@@ -2,6 +2,7 @@ from .columns import field as field
 from .columns import metrics_schema as metrics_schema
 from .columns import metrics_table as metrics_table
 from .columns import trajectory_schema as trajectory_schema
+from .columns import trajectory_table as trajectory_table
 from .crew import Crew as Crew
 from .crew import REFRESH as REFRESH
 from .crew import results as results

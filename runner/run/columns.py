@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from springline.codegen.kernel import METRICS, STATUS, Runs
 from springline.model.system import System
+
+Floats = NDArray[np.float64]
 
 
 def field(name: str, unit: str, kind: pa.DataType | None = None) -> pa.Field:
@@ -34,12 +39,27 @@ def metrics_schema(*systems: System) -> pa.Schema:
     return pa.schema([*judged, field("status", "", pa.string()), field("t_end", "s")])
 
 
+def trajectory_table(system: System, rows: Floats) -> pa.Table:
+    """A trajectory, of the loop's rows (times, columns)."""
+    return pa.Table.from_arrays([_numbers(column) for column in rows.T], schema=trajectory_schema(system))
+
+
 def metrics_table(system: System, runs: Runs) -> pa.Table:
     """Metrics of all runs, one row each."""
-    columns: list[pa.Array] = []
-    for k in range(len(METRICS)):
-        for j in range(system.n):
-            values = runs.metrics[:, j, k]
-            columns.append(pa.array(values, mask=np.isnan(values)))
-    status = pa.array([STATUS[i] for i in runs.status], pa.string())
-    return pa.Table.from_arrays([*columns, status, pa.array(runs.end_time)], schema=metrics_schema(system))
+    columns = [_numbers(runs.metrics[:, j, k], null=True) for k in range(len(METRICS)) for j in range(system.n)]
+    status = _texts([STATUS[i] for i in runs.status])
+    return pa.Table.from_arrays([*columns, status, _numbers(runs.end_time)], schema=metrics_schema(system))
+
+
+# pa.array imports pandas where that is installed, to ask whether what it is given is pandas': longer than a run takes.
+def _numbers(values: Floats, *, null: bool = False) -> pa.Array:
+    """Doubles as they are, NaN as null if asked."""
+    missing = np.isnan(values)
+    valid = pa.py_buffer(np.packbits(~missing, bitorder="little")) if null and missing.any() else None
+    return pa.Array.from_buffers(pa.float64(), len(values), [valid, pa.py_buffer(np.ascontiguousarray(values))])
+
+
+def _texts(values: Sequence[str]) -> pa.Array:
+    parts = [value.encode() for value in values]
+    ends = np.cumsum([0, *map(len, parts)], dtype=np.int32)
+    return pa.StringArray.from_buffers(len(parts), pa.py_buffer(ends), pa.py_buffer(b"".join(parts)))

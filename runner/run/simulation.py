@@ -25,7 +25,7 @@ from springline.codegen.kernel import (
 from springline.model.parameters import Joint
 from springline.model.quantities import entries
 from springline.model.system import System
-from springline.runner.run.columns import metrics_table, trajectory_schema
+from springline.runner.run.columns import metrics_table, trajectory_table
 from springline.runner.run.crew import Crew, results
 from springline.runner.run.limits import refuse_large
 from springline.runner.run.settings import loop_settings
@@ -107,6 +107,6 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     system = scenario.system()
     assert runs.trajectory is not None and runs.rows is not None
     rows = runs.trajectory[0, : runs.rows[0]]
-    trajectory = pa.Table.from_arrays([pa.array(column) for column in rows.T], schema=trajectory_schema(system))
+    trajectory = trajectory_table(system, rows)
     status, message = outcome(system, runs, 0, settings)
     return Result(trajectory, metrics_table(system, runs), status, message)

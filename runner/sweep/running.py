@@ -15,11 +15,10 @@ from importlib import metadata
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from springline.codegen.kernel import ToolchainError
-from springline.runner.run import REFRESH, trajectory_schema
+from springline.runner.run import REFRESH, trajectory_table
 from springline.runner.sweep.dataset import Dataset
 from springline.runner.sweep.drawing import Columns
 from springline.runner.sweep.plan import Chunk, Plan
@@ -121,9 +120,8 @@ def run_sweep(
 def _store(plan: Plan, dataset: Dataset, chunk: Chunk, columns: Columns, outcome: Outcome) -> Exception | None:
     """Write a chunk's part; what went wrong if the place refuses again and again."""
     table = plan.table(chunk, columns, outcome)
-    schema = trajectory_schema(chunk.group.work.system)
     trajectories = {
-        chunk.first + index: pa.Table.from_arrays([pa.array(column) for column in rows.T], schema=schema)
+        chunk.first + index: trajectory_table(chunk.group.work.system, rows)
         for index, rows in zip(plan.kept(chunk), outcome.trajectories, strict=True)
     }
     problem: Exception | None = None

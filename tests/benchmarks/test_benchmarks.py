@@ -4,6 +4,7 @@ import ctypes
 import importlib
 import json
 import math
+import os
 import platform
 import re
 import sys
@@ -18,8 +19,10 @@ import pytest
 
 from springline.benchmarks import (
     against,
+    aims,
     command,
     compile_time,
+    docs_results,
     harness,
     math_speed,
     problem,
@@ -30,8 +33,10 @@ from springline.benchmarks import (
 from springline.benchmarks import report as bench
 from springline.benchmarks.compile_time import compile_times
 from springline.benchmarks.contenders import CONTENDERS, handwritten_c, ours
-from springline.codegen.kernel import kernel
+from springline.codegen.kernel import LoopSettings, kernel, toolchain
+from springline.model.system import System
 from springline.runner import load_scenario
+from springline.runner.files import InputError
 
 TINY = harness.Effort(
     rounds=1, sample=1e-3, adaptive=problem.QUANTUM, compared=problem.QUANTUM, comparison=1e-3, compilers=False
@@ -41,7 +46,7 @@ TINY = harness.Effort(
 AGREEING = {
     repr(contender.build): contender
     for contender in CONTENDERS
-    if "W =" not in contender.variant and "all tunable" not in contender.variant
+    if contender.comparable and "W =" not in contender.variant and "all tunable" not in contender.variant
 }
 
 
@@ -67,7 +72,9 @@ def test_contenders_are_told_apart() -> None:
     assert sum(map(ours.is_default, CONTENDERS)) == len(problem.MODES)
     titles = [contender.title for contender in CONTENDERS]
     assert len(titles) == len(set(titles))
-    assert all(contender.variant.partition(",")[0] == contender.control for contender in CONTENDERS)
+    heads = {contender.variant.partition(",")[0] for contender in CONTENDERS if contender.comparable}
+    assert heads == set(problem.MODES)
+    assert all(contender.variant.startswith(contender.control) for contender in CONTENDERS if contender.comparable)
 
 
 def test_ratios_refer_to_springlines_default_of_the_same_mode() -> None:
@@ -100,6 +107,36 @@ def test_a_result_that_is_no_number_is_wrong_too() -> None:
         "broken", "continuous", "continuous", lambda: lambda delta, steps: np.full((delta.size, 8), np.nan)
     )
     assert not harness.measure(TINY, [default("continuous"), broken]).agreed
+
+
+def test_the_plant_of_an_arm_is_timed_without_its_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    plant = next(contender for contender in CONTENDERS if contender.variant == ours.PLANT)
+    alone = replace(plant, variant=f"{ours.PLANT}, again")
+    report = harness.measure(TINY, [default("continuous"), default("sampled"), plant, alone])
+    assert report.agreed
+    *_, first, second = report.rows
+    assert (first.ratio, second.ratio) == (1.0, second.ns_per_eval / first.ns_per_eval)
+    assert (first.compared, bench.table([first])[0][5]) == (0, "–")
+    # The command is that of the first sample, whatever the law has since become.
+    delta = np.array([0.04, 0.06])
+    held = plant.build()(delta, problem.QUANTUM)
+    controlled = ours.reference("sampled")(delta, problem.QUANTUM)
+    assert np.max(np.abs(held - controlled)) > 1e-2
+    np.testing.assert_array_equal(
+        held, ours.build(ours.DEFAULT["sampled"], hold=problem.QUANTUM)(delta, problem.QUANTUM)
+    )
+    monkeypatch.setattr(ours, "LoopSettings", lambda *found, **more: LoopSettings(*found, bound=0.1, **more))
+    with pytest.raises(RuntimeError, match="out_of_bounds: its time says nothing"):
+        plant.build()(delta, problem.QUANTUM)
+
+
+def test_arms_of_which_the_plant_is_timed_have_numbers_of_their_own() -> None:
+    assert {variant: System(arm).n for variant, arm in ours.PLANTS.items()} == {ours.PLANT: 2, ours.SEVEN: 7}
+    for arm in ours.PLANTS.values():
+        assert arm.base_motion == ours.STRUCTURE.base_motion
+        found = ours.values(arm)
+        assert found["base_motion.heave.0.amplitude"] == problem.SHAKE_AMPLITUDE
+    assert found["mechanism.mass.6"] > 0.0
 
 
 def test_a_missing_package_is_told_and_does_no_harm() -> None:
@@ -187,7 +224,79 @@ def test_the_command_writes_rows_a_chart_and_json(
     assert {path.name for path in (tmp_path / "bench").iterdir()} == set(bench.OUTPUTS)
     kept = json.loads((tmp_path / "bench" / "bench.json").read_text())
     assert kept["rows"] == answer["rows"]
+    assert kept["aims"] == answer["aims"]
+    assert [one["aim"] for one in kept["aims"]] == [aim.name for aim in aims.AIMS]
+    by_name = {one["aim"]: one for one in kept["aims"]}
+    assert by_name["continuous: handwritten C"]["measured"] > 0.0
+    assert by_name["continuous: JAX"]["verdict"] == "not measured: not among the contenders"
     assert kept["machine"]["versions"]["casadi"]
+
+
+MACHINE = {"instruction_set": "x86-64-v3", "free_cores": 2.0}
+
+
+def judged(longer: float, shorter: float, aim: aims.Aim, **machine: object) -> aims.Judgement:
+    rows = [harness.Row(*line, ns) for line, ns in ((aim.longer, longer), (aim.shorter, shorter)) if not math.isnan(ns)]
+    [found] = aims.judge(harness.Report(rows, MACHINE | machine), [aim])
+    return found
+
+
+def test_an_aim_is_reached_or_missed_as_the_instruction_set_has_it() -> None:
+    aim = aims.Aim("a", ("them", "continuous"), ("us", "continuous"), (25.0, 10.0))
+    for instructions, ns, expected in (
+        ("x86-64-v3", 99.0, "missed"),
+        ("x86-64-v3", 100.0, "reached"),
+        ("x86-64-v4", 100.0, "missed"),
+        ("x86-64-v4", 250.0, "reached"),
+        ("neon", 250.0, "no aim for neon"),
+        ("x86-64-v2", 250.0, "no aim for x86-64-v2"),
+    ):
+        found = judged(ns, 10.0, aim, instruction_set=instructions)
+        assert (found.measured, found.verdict) == (ns / 10.0, expected)
+    most = replace(aim, wanted=1.2, most=True)
+    assert [judged(ns, 10.0, most).verdict for ns in (11.9, 12.1)] == ["reached", "missed"]
+    assert judged(11.9, 10.0, most, instruction_set="neon").verdict == "reached"
+
+
+def test_an_aim_whose_lines_or_cores_are_missing_says_so() -> None:
+    aim = aims.Aim("a", ("them", "continuous"), ("us", "continuous"), 1.9)
+    assert judged(math.nan, 1.0, aim).verdict == "not measured: not among the contenders"
+    assert judged(math.nan, 1.0, replace(aim, how="--before CHECKOUT")).verdict == "not measured: --before CHECKOUT"
+    absent = harness.Report(
+        [harness.Row("them", "continuous", note="needs jax"), harness.Row("us", "continuous", 1.0)], MACHINE
+    )
+    assert aims.judge(absent, [aim])[0].verdict == "not measured: needs jax"
+    threads = replace(aim, cores=2)
+    assert judged(1.5, 1.0, threads, free_cores=1.3).verdict == "not judged: 1.30 cores were free"
+    assert judged(1.95, 1.0, threads, free_cores=1.3).verdict == "reached"
+    assert judged(1.5, 1.0, threads).verdict == "missed"
+
+
+def test_every_aim_is_of_two_lines_that_the_benchmark_has() -> None:
+    lines = {(contender.name, contender.variant) for contender in CONTENDERS}
+    lines |= {(contender.name, contender.variant) for contender in against.contenders(Path(sys.executable))}
+    if (os.cpu_count() or 1) == 1:
+        lines |= {(ours.NAME, f"{mode}, 2 threads") for mode in problem.MODES}
+    assert not [line for aim in aims.AIMS for line in (aim.longer, aim.shorter) if line not in lines]
+    assert len({aim.name for aim in aims.AIMS}) == len(aims.AIMS)
+    for column in aims.COLUMNS:
+        assert all(aim.on(column) > 1.0 for aim in aims.AIMS)
+
+
+@pytest.mark.skipif((os.cpu_count() or 1) == 1, reason="there is one processor core")
+def test_threads_are_judged_by_the_cores_that_are_free() -> None:
+    threads = next(contender for contender in CONTENDERS if contender.threads == 2)
+    alone, both = (harness.measure(TINY, [default("continuous"), *more]) for more in ([], [threads]))
+    assert alone.machine["free_cores"] is None
+    assert both.machine["free_cores"] > 0.0
+
+
+def test_the_instruction_set_goes_with_the_width_of_vectors() -> None:
+    found = toolchain.native_instruction_set()
+    wide = {"x86-64-v4": 8, "x86-64-v3": 4}.get(found)
+    assert wide in (None, toolchain.native_vector_width())
+    text = "\n".join(bench.machine_lines(harness.measure(TINY, [default("continuous")])))
+    assert f", {found}, vectors of {toolchain.native_vector_width()} doubles" in text
 
 
 def test_the_table_has_a_cell_for_every_column() -> None:
@@ -231,6 +340,44 @@ def test_checkouts_that_differ_end_the_comparison_with_1(
     assert "q1 from row 0 on (1.0, and 1.5 in the other), by at most 0.5" in capsys.readouterr().out
 
 
+def test_the_page_has_the_results_as_the_benchmark_prints_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "performance.md").read_text("utf-8")
+    _, _, rest = page.partition(f"<!-- {docs_results.NAME}: begin -->\n")
+    shown, found, _ = rest.partition(f"<!-- {docs_results.NAME}: end -->\n")
+    assert found
+    lines = [[cell.strip() for cell in line.strip("|").split("|")] for line in shown.splitlines() if line[:1] == "|"]
+    split = lines.index(list(bench.AIM_COLUMNS))
+    results, judgements = lines[2:split], lines[split + 2 :]
+    assert lines[0] == list(bench.COLUMNS)
+    assert {len(line) for line in results} == {len(bench.COLUMNS)}
+    assert [line[0] for line in judgements] == [aim.name for aim in aims.AIMS]
+    there = {(contender.name, contender.variant) for contender in CONTENDERS}
+    there |= {(contender.name, contender.variant) for contender in against.contenders(Path(sys.executable))}
+    shown_lines = {(line[0], line[1]) for line in results}
+    several = re.compile(" threads$")  # as many as the machine has cores
+    assert {line for line in shown_lines ^ there if not several.search(line[1])} == set()
+    assert {(ours.NAME, f"{mode}, 2 threads") for mode in problem.MODES} <= shown_lines
+    assert all(re.search("^(reached|missed|not judged: .*)$", line[3]) for line in judgements)
+
+    copy = tmp_path / "performance.md"
+    copy.write_text(page, encoding="utf-8")
+    (tmp_path / "bench.md").write_text("anew\n")
+    monkeypatch.setattr(docs_results, "PAGE", tmp_path / "nowhere.md")
+    monkeypatch.setattr(sys, "argv", ["docs_results", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        docs_results.main()
+    assert "run it in a checkout" in capsys.readouterr().err
+    monkeypatch.setattr(docs_results, "PAGE", copy)
+    docs_results.main()
+    assert copy.read_text("utf-8") == page.replace(shown, "anew\n")
+    monkeypatch.setattr(sys, "argv", ["docs_results", str(tmp_path / "absent")])
+    with pytest.raises(SystemExit):
+        docs_results.main()
+    assert "run `springline bench` first" in capsys.readouterr().err
+
+
 def checkout(folder: Path) -> Path:
     """A folder that looks like a checkout: it has the springline of these tests."""
     python = folder / ".venv" / "bin" / "python"
@@ -250,6 +397,20 @@ def test_two_checkouts_are_timed_in_one_process(
     assert len(lines) == 1 + len(against.WORK)
     assert all(len(line) <= 80 for line in lines)
     assert all(float(line.split()[-1]) > 0.0 for line in lines[1:])
+
+
+def test_the_kernels_of_another_checkout_are_contenders(tmp_path: Path) -> None:
+    before = against.contenders(against.interpreter_of(checkout(tmp_path)))
+    report = harness.measure(TINY, [default("continuous"), default("sampled"), *before])
+    assert report.agreed
+    assert [(row.contender, row.variant, row.difference) for row in report.rows[2:]] == [
+        (against.NAME, mode, 0.0) for mode in problem.MODES
+    ]
+    for broken, told in ((tmp_path / "absent", "run `make install`"), (checkout(tmp_path / "empty"), "cannot import")):
+        if broken.exists():
+            (broken / ".venv" / "bin" / "python").write_text("#!/bin/sh\nexit 1\n")
+        with pytest.raises(InputError, match=told):
+            command.bench(output=tmp_path / "out", before=broken)
 
 
 def test_the_packages_of_another_checkout_are_its_own_and_ours_come_back(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@ from .cache import load as load
 from .compiler import Compiler as Compiler
 from .compiler import find_compiler as find_compiler
 from .compiler import native_flags as native_flags
+from .compiler import native_instruction_set as native_instruction_set
 from .compiler import native_vector_width as native_vector_width
 from .compiler import probe_compiler as probe_compiler
 from .doctor import Check as Check

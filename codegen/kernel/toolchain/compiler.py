@@ -134,6 +134,28 @@ def native_vector_width(compiler: Compiler | None = None) -> int:
     return 4 if "__AVX__" in macros else 2
 
 
+# What the psABI of x86-64 asks of its levels, as macros; each level has what stands below it.
+_LEVELS = {
+    "x86-64-v4": ("AVX512F", "AVX512BW", "AVX512CD", "AVX512DQ", "AVX512VL"),
+    "x86-64-v3": ("AVX", "AVX2", "BMI", "BMI2", "F16C", "FMA", "LZCNT", "MOVBE"),
+    "x86-64-v2": ("POPCNT", "SSE3", "SSSE3", "SSE4_1", "SSE4_2"),
+    "x86-64": ("x86_64",),
+}
+
+
+def native_instruction_set(compiler: Compiler | None = None) -> str:
+    """What the compiler may use of this CPU: "x86-64" to "x86-64-v4", "neon", or the target's architecture."""
+    compiler = compiler or find_compiler()
+    macros = predefined_macros(compiler, native_flags(compiler))
+    needed: set[str] = set()
+    found = "neon" if "__ARM_NEON" in macros else compiler.target.partition("-")[0]
+    for level, features in reversed(_LEVELS.items()):
+        needed |= {f"__{name}__" for name in features}
+        if needed <= macros.keys():
+            found = level
+    return found
+
+
 def run_compiler(argv: Sequence[str], *, cwd: Path | None = None, stdin: str = "") -> subprocess.CompletedProcess[str]:
     """Run a compiler. Raises ToolchainError with the command and the first lines of its messages."""
     environment = dict(os.environ, LC_ALL="C")

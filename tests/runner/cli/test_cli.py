@@ -910,6 +910,16 @@ def test_version_and_help_wait_for_no_library() -> None:
     assert shown.splitlines()[-1] == "[]"
 
 
+def test_a_run_without_figures_waits_for_no_library_that_it_does_not_use(elsewhere: Path) -> None:
+    """Arrow would ask pandas of every column that is given to it, and pandas takes longer than a run."""
+    pytest.importorskip("pandas")
+    code = "import sys; from springline.runner.cli import app; app(standalone_mode=False); print(*sys.modules)"
+    words = ["run", "paper/nominal", "--set", "simulation.duration=0.01", "-o", elsewhere / "out", "--no-plot"]
+    modules = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True).stdout
+    assert "pyarrow" in modules.split()
+    assert not {"matplotlib", "pandas", "scipy"} & set(modules.split())
+
+
 def test_default_folder_stays_below_results(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A packaged scenario's folder has its name; a file's has the file's own, wherever that lies."""
     (elsewhere / "deep").mkdir()

@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 from springline.codegen.kernel import METRICS, MOST_STEPS, LoopSettings, Runs
 from springline.runner.cli import app
 from springline.runner.files import InputError
-from springline.runner.run import metrics_schema, simulate, trajectory_hash
+from springline.runner.run import metrics_schema, metrics_table, simulate, trajectory_hash, trajectory_table
 from springline.runner.run.simulation import outcome
 from springline.runner.scenario import load_scenario
 
@@ -22,6 +22,30 @@ from springline.runner.scenario import load_scenario
 def springline(*arguments: str | Path) -> Result:
     """Run a command in this process."""
     return CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="springline")
+
+
+def test_tables_have_the_loops_doubles_and_null_for_a_metric_that_there_is_none() -> None:
+    system = load_scenario("paper/nominal").system()
+    found = np.random.default_rng(1).normal(size=(3, system.n, len(METRICS)))
+    found[1, 0, 2] = found[2, 1, 0] = np.nan
+    runs = Runs(found, np.zeros((3, 8)), np.array([4.0, -0.0, 1.0]), np.array([0, 1, 0]), np.full(3, -1), None, None)
+    table = metrics_table(system, runs)
+    table.validate(full=True)
+    assert table.schema.equals(metrics_schema(system), check_metadata=True)
+    assert table["status"].to_pylist() == ["ok", "diverged", "ok"]
+    assert table["t_end"].equals(pa.chunked_array([pa.array(runs.end_time)]))
+    for number, name in enumerate(table.column_names[:-2]):
+        values = found[:, number % system.n, number // system.n]
+        assert table[name].equals(pa.chunked_array([pa.array(values, mask=np.isnan(values))]))
+    assert sum(table[name].null_count for name in table.column_names) == 2
+    rows = np.random.default_rng(2).normal(size=(5, len(system.trajectory)))
+    rows[4, 3] = np.nan  # stays a number, which is none
+    for length in (5, 0):
+        table = trajectory_table(system, rows[:length])
+        table.validate(full=True)
+        assert table.num_rows == length and table["t"].null_count == 0
+        for column, values in zip(table.columns, rows[:length].T, strict=True):
+            assert column.to_numpy().tobytes() == values.tobytes()
 
 
 def test_a_trajectorys_hash_is_of_its_doubles_in_their_order() -> None:

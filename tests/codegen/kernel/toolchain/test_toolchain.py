@@ -24,9 +24,11 @@ from springline.codegen.kernel.toolchain import (
     find_compiler,
     load,
     native_flags,
+    native_instruction_set,
     native_vector_width,
     probe_compiler,
 )
+from springline.codegen.kernel.toolchain import compiler as compilers
 from springline.codegen.kernel.toolchain.compiler import _find_compiler, predefined_macros
 from springline.codegen.kernel.toolchain.errors import cache_root
 
@@ -583,3 +585,31 @@ def test_checks_for_doctor(cache: Path) -> None:
     assert rows["cache"].value == str(cache)
     assert rows["build and load"].value == "works"
     assert rows["vector width"].value == f"{native_vector_width()} doubles"
+
+
+@pytest.mark.parametrize(
+    ("target", "features", "expected"),
+    [
+        ("x86_64-linux-gnu", "x86_64", "x86-64"),
+        ("x86_64-linux-gnu", "x86_64 SSE3 SSSE3 SSE4_1 SSE4_2 POPCNT", "x86-64-v2"),
+        ("x86_64-linux-gnu", "x86_64 SSE3 SSSE3 SSE4_1 SSE4_2 POPCNT AVX", "x86-64-v2"),
+        ("aarch64-linux-gnu", "aarch64 ARM_NEON", "neon"),
+        ("riscv64-linux-gnu", "riscv", "riscv64"),
+    ],
+)
+def test_an_instruction_set_is_the_highest_whose_features_are_all_there(
+    target: str, features: str, expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    macros = {f"__{name}" if name == "ARM_NEON" else f"__{name}__": "1" for name in features.split()}
+    monkeypatch.setattr(compilers, "native_flags", lambda compiler: ())
+    monkeypatch.setattr(compilers, "predefined_macros", lambda compiler, flags: macros)
+    assert native_instruction_set(Compiler(("cc",), "gcc", "1", target)) == expected
+
+
+@pytest.mark.parametrize("level", ["x86-64", "x86-64-v2", "x86-64-v3", "x86-64-v4"])
+def test_an_instruction_set_is_what_the_compiler_was_told(level: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiler = find_compiler()
+    if compiler.family != "gcc" or not compiler.target.startswith("x86_64"):
+        pytest.skip("levels are told to gcc on x86-64")
+    monkeypatch.setattr(compilers, "native_flags", lambda compiler: (f"-march={level}",))
+    assert native_instruction_set(compiler) == level
