@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from springline.benchmarks.against import Clock, packages_of
+from springline.benchmarks.against import Clock, interpreter_of, packages_of
 
 RUNS = 32
 STEP = 1e-4
@@ -146,7 +146,7 @@ def main() -> int:
     if chosen.other is None:
         parser.error("which other checkout?")
     try:
-        there = timed(chosen.other / ".venv/bin/python")
+        there = timed(interpreter_of(chosen.other))
     except ValueError as error:
         parser.error(str(error))
     here, worst = timed(Path(sys.executable)), 0.0
