@@ -135,7 +135,7 @@ def polynomials() -> tuple[Polynomial, ...]:
         _logarithm("POW", "(2 atanh(s) / s - 2) / z of z = s^2, s <= 1 / 16", mp.mpf(1) / 16, 6, 3),
         _thirds("MINUS_ONE_THIRD", 1, "5.64e-6", 2, 0),
         _thirds("MINUS_TWO_THIRDS", 2, "2.82e-6", 2, 0),
-        _thirds("MINUS_ONE_THIRD_LONG", 1, "5.9e-3", 0, 3),
+        _thirds("MINUS_ONE_THIRD_LONG", 1, "1.18e-2", 0, 3),
     )
 
 

@@ -207,11 +207,11 @@ MINUS_TWO_THIRDS = (
     float.fromhex("0x1.555555555bcf7p-1"),
     float.fromhex("0x1.1c71c71c79b04p-1"),
 )
-# ((1 - h)^(-1/3) - 1) / h, |h| <= 5.9e-3
+# ((1 - h)^(-1/3) - 1) / h, |h| <= 1.18e-2
 MINUS_ONE_THIRD_LONG = (
     float.fromhex("0x1.5555560000000p-2"),
-    float.fromhex("0x1.c71ea00000000p-3"),
-    float.fromhex("0x1.61fce00000000p-3"),
+    float.fromhex("0x1.c725280000000p-3"),
+    float.fromhex("0x1.6206760000000p-3"),
 )
 # a, b, c, k: k (u - a) (u (u - b) + c) ~ u^(-1/3), 2.6653 <= u <= 3.1590
 CUBE_ROOT_START = Both(
