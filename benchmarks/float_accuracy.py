@@ -94,11 +94,11 @@ def _library(name: str, defined: dict[str, object]) -> ctypes.CDLL:
     return library
 
 
-def at_every_float(name: str) -> Row:
-    """The largest error of a function of one argument."""
+def at_every_float(name: str, low: int = 0, high: int = 2**31) -> Row:
+    """The largest error of a function of one argument, of both signs; `low` and `high` are bits, for less than all."""
     library, where = _library(name, {"SYMMETRY": SYMMETRY.get(name, 0)}), ctypes.c_float()
     worst = Row(name, EVERY, -1.0, ())
-    for first in range(0, 2**31, CHUNK):
+    for first in range(low, high, CHUNK):
         error = library.worst(ctypes.c_uint32(first), ctypes.c_uint32(CHUNK), ctypes.byref(where))
         if error > worst.error:
             worst = Row(name, EVERY, error, (where.value,))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from springline.codegen.elementary.coefficients import ASIN, ATAN
-from springline.codegen.elementary.primitives import Computed, absolute, chained, cut, fours, hexadecimal, with_sign
+from springline.codegen.elementary.primitives import Computed, absolute, chained, cut, fours, hexadecimal, is_single, with_sign
 from springline.codegen.elementary.words import Both, Word, constant, fmax, fmin, if_, named, select, sqrt, true
 
 HALF_PI = Both(hexadecimal("0x1.921fb54442d18p+0"), hexadecimal("0x1.921fb6p+0"))
@@ -94,8 +94,11 @@ def asin(x: Word) -> Computed:
     small, s, sh, sl, tail = _halves(x)
     a = named("abs_x", absolute(x))
     p = named("p", (2.0 * s) * tail - (HALF_PI_LO() - 2.0 * sl))
-    q = named("q", QUARTER_PI() - 2.0 * sh)
-    large = named("large", QUARTER_PI() - (p - q))
+    if is_single():  # the low part of pi/2 is no small one there: asin 1 would be the float below
+        large = named("large", (HALF_PI() - 2.0 * sh) - p)
+    else:
+        q = named("q", QUARTER_PI() - 2.0 * sh)
+        large = named("large", QUARTER_PI() - (p - q))
     return (with_sign(named("size", select(small, a + a * tail, large)), x),), None
 
 
