@@ -200,7 +200,7 @@ def coefficients(polynomial: Polynomial, single: bool = False) -> tuple[float, .
 
     with mp.workprec(PRECISION):
         known: list[Real] = []
-        if polynomial.low == 0:
+        if polynomial.low == 0 or (single and polynomial.name != START.name):
             for _ in range(min(2, polynomial.terms)):
                 known.append(mp.mpf(rounded(best(polynomial, known)[0])))
         if polynomial.terms == len(known):

@@ -5,7 +5,16 @@ from __future__ import annotations
 import sys
 
 from springline.codegen.elementary.coefficients import ASIN, ATAN
-from springline.codegen.elementary.primitives import Computed, absolute, chained, cut, fours, hexadecimal, is_single, with_sign
+from springline.codegen.elementary.primitives import (
+    Computed,
+    absolute,
+    chained,
+    cut,
+    fours,
+    hexadecimal,
+    is_single,
+    with_sign,
+)
 from springline.codegen.elementary.words import Both, Word, constant, fmax, fmin, if_, named, select, sqrt, true
 
 HALF_PI = Both(hexadecimal("0x1.921fb54442d18p+0"), hexadecimal("0x1.921fb6p+0"))

@@ -19,10 +19,10 @@ EXPM1 = Both(
     (
         float.fromhex("0x1.0000000000000p-1"),
         float.fromhex("0x1.5555540000000p-3"),
-        float.fromhex("0x1.55548e0000000p-5"),
-        float.fromhex("0x1.1112700000000p-7"),
-        float.fromhex("0x1.6d8cf20000000p-10"),
-        float.fromhex("0x1.9f08980000000p-13"),
+        float.fromhex("0x1.5554e80000000p-5"),
+        float.fromhex("0x1.11130e0000000p-7"),
+        float.fromhex("0x1.6d4cb80000000p-10"),
+        float.fromhex("0x1.9dfa7e0000000p-13"),
     ),
 )
 # the same, |r| <= ln 2 / 4
@@ -210,8 +210,8 @@ MINUS_TWO_THIRDS = (
 # ((1 - h)^(-1/3) - 1) / h, |h| <= 1.18e-2
 MINUS_ONE_THIRD_LONG = (
     float.fromhex("0x1.5555560000000p-2"),
-    float.fromhex("0x1.c725280000000p-3"),
-    float.fromhex("0x1.6206760000000p-3"),
+    float.fromhex("0x1.c725060000000p-3"),
+    float.fromhex("0x1.61dca40000000p-3"),
 )
 # a, b, c, k: k (u - a) (u (u - b) + c) ~ u^(-1/3), 2.6653 <= u <= 3.1590
 CUBE_ROOT_START = Both(

@@ -16,6 +16,7 @@ from springline.codegen.elementary.primitives import (
     chained,
     fours,
     hexadecimal,
+    in_pairs,
     is_single,
     one,
     to_field,
@@ -39,6 +40,8 @@ def _power(x: Word) -> tuple[Word, Word]:
 def _series(r: Word) -> Word:
     """r^2 P(r)."""
     r2 = named("r2", r * r)
+    if is_single():
+        return r2 * named("p", in_pairs(EXPM1(), r, r2))
     r4 = named("r4", r2 * r2)
     return r2 * chained(fours(EXPM1(), r, r2), r4)
 

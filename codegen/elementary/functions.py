@@ -53,7 +53,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Computed], int]] = {
 
 
 @cache
-def procedure(name: str, format: Format = DOUBLE) -> Procedure:
+def procedure(name: str, fmt: Format = DOUBLE) -> Procedure:
     """The steps of an elementary function."""
     function, inputs = FUNCTIONS[name]
-    return trace(function, inputs, format)
+    return trace(function, inputs, fmt)

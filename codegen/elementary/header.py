@@ -23,9 +23,9 @@ _PARTS: dict[str, Callable[..., Computed]] = {
 """What only the headers need: pow without the rule for listed exponents, and what rare functions are made of."""
 
 
-def _printers(format: Format) -> dict[str, Callable[..., str]]:
+def _printers(fmt: Format) -> dict[str, Callable[..., str]]:
     def traced(name: str, inputs: int) -> Procedure:
-        return trace(_PARTS[name], inputs, format) if name in _PARTS else procedure(name, format)
+        return trace(_PARTS[name], inputs, fmt) if name in _PARTS else procedure(name, fmt)
 
     def checked(name: str, *inputs: str, rare: str | None = None, results: Mapping[str, str] | None = None) -> str:
         """A function with its fast path; by default <name>_rare has the rest."""

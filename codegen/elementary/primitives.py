@@ -30,7 +30,8 @@ ONE = Both(0x3FF0000000000000, 0x3F800000)
 HIGH_HALF = Both(0xFFFFFFFFF8000000, 0xFFFFF000)  # leaves 26 or 12 significant bits: two such have an exact product
 SMALLEST_NORMAL = Both(0x0010000000000000, 0x00800000)
 NORMAL = Both(0x7FE0000000000000, 0x7F000000)  # so many bit patterns from there on
-ROUND = Both(hexadecimal("0x1.8p52"), hexadecimal("0x1.8p23"))  # x + ROUND holds x, rounded to an integer, in its low bits
+ROUND = Both(hexadecimal("0x1.8p52"), hexadecimal("0x1.8p23"))
+"""x + ROUND holds x, rounded to an integer, in its low bits."""
 LN2_HI = Both(hexadecimal("0x1.62e42fefa38p-1"), hexadecimal("0x1.62e4p-1"))  # short: times an exponent it is exact
 LN2_LO = Both(hexadecimal("0x1.ef35793c7673p-45"), hexadecimal("0x1.7f7d1cp-20"))
 INTEGERS = Both(2.0**52, 2.0**23)  # from there on there is nothing else
@@ -83,29 +84,29 @@ def is_single() -> bool:
     return traced_format() is SINGLE
 
 
-def in_pairs(c: Sequence[float], x: Word, x2: Word) -> Word | float:
+def in_pairs(c: Sequence[float], x: Word, x2: Word) -> Word:
     """The polynomial of these coefficients by pairs, a chain of two operations for each."""
     if len(c) > 6:  # more than a line has room for
-        rest = in_pairs(c[4:], x, x2)
-        assert isinstance(rest, Word)
-        return chained([c[0] + x * c[1], c[2] + x * c[3], named(f"p4{len(c) - 1:x}", rest)], x2)
+        rest = named(f"p4{len(c) - 1:x}", in_pairs(c[4:], x, x2))
+        return chained([c[0] + x * c[1], c[2] + x * c[3], rest], x2)
     return chained([c[i] + x * c[i + 1] if i + 1 < len(c) else c[i] for i in range(0, len(c), 2)], x2)
 
 
 def fours(c: Sequence[float], x: Word, x2: Word) -> list[Word | float]:
     """Its parts of four coefficients, which a reader knows as p and the first and last of them."""
-    parts = []
-    for i in range(0, len(c), 4):
-        part = in_pairs(c[i : i + 4], x, x2)
-        parts.append(named(f"p{i:x}{min(i + 4, len(c)) - 1:x}", part) if isinstance(part, Word) else part)
-    return parts
+    parts = [c[i : i + 4] for i in range(0, len(c), 4)]
+    return [
+        named(f"p{4 * i:x}{4 * i + len(part) - 1:x}", in_pairs(part, x, x2)) if len(part) > 1 else part[0]
+        for i, part in enumerate(parts)
+    ]
 
 
-def chained(parts: Sequence[Word | float], x: Word) -> Word | float:
+def chained(parts: Sequence[Word | float], x: Word) -> Word:
     """The polynomial of x whose coefficients these are, by Horner's rule."""
     *before, result = parts
     for part in reversed(before):
         result = part + x * result
+    assert isinstance(result, Word)
     return result
 
 

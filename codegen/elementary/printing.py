@@ -45,20 +45,20 @@ _PATTERNS = {"SIGN_BIT": SIGN_BIT, "FRACTION": FRACTION, "ONE": ONE}
 class _Dialect:
     """How a format's C looks: doubles in the macros that make scalar and lanes of it, floats as they are."""
 
-    def __init__(self, format: Format) -> None:
+    def __init__(self, fmt: Format) -> None:
         def of(both: Both[T]) -> T:
-            return both.double if format is DOUBLE else both.single
+            return both.double if fmt is DOUBLE else both.single
 
-        prefix, high = ("SL", "HIGH_26") if format is DOUBLE else ("SLF", "HIGH_12")
-        self.format, self.prefix = format, prefix
+        prefix, high = ("SL", "HIGH_26") if fmt is DOUBLE else ("SLF", "HIGH_12")
+        self.format, self.prefix = fmt, prefix
         self.types = {Kind.REAL: "SL_F", Kind.BITS: "SL_B", Kind.MASK: "SL_M"}
-        if format is SINGLE:
+        if fmt is SINGLE:
             self.types = {Kind.REAL: "float", Kind.BITS: "uint32_t", Kind.MASK: "int"}
-        self.suffix = "f" if format is SINGLE else ""
+        self.suffix = "f" if fmt is SINGLE else ""
         self._numbers = {of(value): f"{prefix}_{name}" for name, value in _NUMBERS.items()}
         self._patterns = {of(value): f"{prefix}_{name}" for name, value in _PATTERNS.items()}
         for name in ("SIGN_BIT", "FRACTION"):
-            self._patterns[2**format.width - 1 - of(_PATTERNS[name])] = f"~{prefix}_{name}"
+            self._patterns[2**fmt.width - 1 - of(_PATTERNS[name])] = f"~{prefix}_{name}"
         self._patterns[of(HIGH_HALF)] = f"{prefix}_{high}"
         self.sign_bit = of(SIGN_BIT)
 
@@ -85,7 +85,7 @@ class _Dialect:
         return self._patterns.get(value, f"UINT{self.format.width}_C(0x{value:0{digits}x})")
 
 
-_DIALECTS = {format: _Dialect(format) for format in (DOUBLE, SINGLE)}
+_DIALECTS = {each: _Dialect(each) for each in (DOUBLE, SINGLE)}
 
 LINE = 100
 _LONGER = 10  # steps; copysign itself has so many
@@ -144,7 +144,9 @@ class Statements:
         if self._steps[place].op is Op.BIT_OR:
             size, sign = (
                 self._masked(each, mask)
-                for each, mask in zip(self._steps[place].arguments, (self._dialect.sign_bit - 1, self._dialect.sign_bit), strict=True)
+                for each, mask in zip(
+                    self._steps[place].arguments, (self._dialect.sign_bit - 1, self._dialect.sign_bit), strict=True
+                )
             )
             if size is not None and sign is not None:
                 return f"{self._dialect.function('copysign')}({self._argument(size)}, {self._argument(sign)})"

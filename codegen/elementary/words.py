@@ -154,8 +154,8 @@ class Procedure:
 
 
 class _Trace:
-    def __init__(self, format: Format) -> None:
-        self.format = format
+    def __init__(self, fmt: Format) -> None:
+        self.format = fmt
         self.steps: list[Step] = []
         self.names: dict[int, str] = {}
         self._places: dict[object, int] = {}
@@ -185,6 +185,7 @@ class Both(Generic[T]):
     single: T
 
     def __call__(self) -> T:
+        """The one of the format being traced."""
         return self.double if traced_format() is DOUBLE else self.single
 
 
@@ -344,10 +345,10 @@ def below(b: Word, limit: int) -> Word:
 
 
 def trace(
-    function: Callable[..., tuple[tuple[Word, ...], Word | None]], inputs: int, format: Format = DOUBLE
+    function: Callable[..., tuple[tuple[Word, ...], Word | None]], inputs: int, fmt: Format = DOUBLE
 ) -> Procedure:
     """Run a function of so many Words, which returns its results and where they hold, and note its steps."""
-    current = _Trace(format)
+    current = _Trace(fmt)
     token = _CURRENT.set(current)
     try:
         results, fine = function(*(current.word(Op.INPUT, (), k) for k in range(inputs)))
@@ -359,5 +360,5 @@ def trace(
         None if fine is None else fine.place,
         inputs,
         current.names,
-        format,
+        fmt,
     )

@@ -21,7 +21,7 @@ from springline.codegen.elementary.words import DOUBLE, SINGLE, Both, Format
 from springline.codegen.kernel import toolchain
 
 ROOT = Path(__file__).parents[3]
-FORMATS = pytest.mark.parametrize("format", [DOUBLE, SINGLE], ids=lambda format: format.name)
+FORMATS = pytest.mark.parametrize("fmt", [DOUBLE, SINGLE], ids=lambda fmt: fmt.name)
 REALS, PATTERNS = {DOUBLE: np.float64, SINGLE: np.float32}, {DOUBLE: np.uint64, SINGLE: np.uint32}
 
 
@@ -78,11 +78,11 @@ def evaluated(program: Procedure, *inputs: np.ndarray) -> tuple[list[np.ndarray]
 def compiled() -> dict[Format, ctypes.CDLL]:
     """many_<name>(x, y, r, n) for every function."""
     libraries = {}
-    for format, prefix, header, text in (
+    for fmt, prefix, header, text in (
         (DOUBLE, "sl", "sl_math.h", math_header()),
         (SINGLE, "slf", "sl_mathf.h", float_header()),
     ):
-        real = format.name
+        real = fmt.name
         lines = [f'#include "{header}"', f"#define ARRAYS const {real} *x, const {real} *y, {real} *r, int n"]
         for name, (_, inputs) in FUNCTIONS.items():
             if name == "sincos":
@@ -92,7 +92,7 @@ def compiled() -> dict[Format, ctypes.CDLL]:
             lines.append(f"void many_{name}(ARRAYS);")
             lines.append(f"void many_{name}(ARRAYS) {{ (void)y; for (int i = 0; i < n; i++) {{ {body} }} }}")
         sources = {header: text, "many.c": "\n".join(lines) + "\n"}
-        libraries[format] = toolchain.load(toolchain.build_library(sources, main="many.c", flags=("-O1",)))
+        libraries[fmt] = toolchain.load(toolchain.build_library(sources, main="many.c", flags=("-O1",)))
     return libraries
 
 
@@ -119,14 +119,25 @@ def arguments() -> Arguments:
     rng = np.random.default_rng(3)
     n = 4000
     drawn = {}
-    for format, pattern in PATTERNS.items():
-        real, largest = REALS[format], {DOUBLE: 800.0, SINGLE: 100.0}[format]
-        bits = [rng.integers(0, 2**format.width, n, pattern).view(real) for _ in range(2)]
+    for fmt, pattern in PATTERNS.items():
+        real, largest = REALS[fmt], {DOUBLE: 800.0, SINGLE: 100.0}[fmt]
+        bits = [rng.integers(0, 2**fmt.width, n, pattern).view(real) for _ in range(2)]
         x = [bits[0], rng.uniform(-largest, largest, n), np.exp(rng.uniform(-40, 40, n)), rng.uniform(-2, 2, n)]
         y = [bits[1], rng.uniform(-3, 3, n), rng.uniform(-8, 8, n), rng.uniform(-2, 2, n)]
         limits = np.finfo(real)
-        edges = [0.0, -0.0, math.inf, -math.inf, math.nan, limits.smallest_subnormal, limits.tiny, limits.max, 1.0, -1.0]
-        drawn[format] = tuple(
+        edges = [
+            0.0,
+            -0.0,
+            math.inf,
+            -math.inf,
+            math.nan,
+            limits.smallest_subnormal,
+            limits.tiny,
+            limits.max,
+            1.0,
+            -1.0,
+        ]
+        drawn[fmt] = tuple(
             np.concatenate([each.astype(real) for each in (*parts, np.array(ends))])
             for parts, ends in ((x, edges), (y, edges[::-1]))
         )
@@ -136,11 +147,11 @@ def arguments() -> Arguments:
 @FORMATS
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_printed_c_has_the_bits_of_the_program(
-    compiled: dict[Format, ctypes.CDLL], arguments: Arguments, name: str, format: Format
+    compiled: dict[Format, ctypes.CDLL], arguments: Arguments, name: str, fmt: Format
 ) -> None:
-    x, y = arguments[format]
-    program = procedure(name, format)
-    (result, *_), fine = evaluated(program, *arguments[format][: program.inputs])
+    x, y = arguments[fmt]
+    program = procedure(name, fmt)
+    (result, *_), fine = evaluated(program, *arguments[fmt][: program.inputs])
     assert np.all(same(result, called(compiled, name, x, y))[fine])
     assert fine.sum() > x.size / 8
 
@@ -177,33 +188,31 @@ CLOSE = {DOUBLE: (3e-12, 1e-9), SINGLE: (1e-5, 2e-2)}
 
 @FORMATS
 @pytest.mark.parametrize("name", EDGES[DOUBLE])
-def test_the_fast_path_ends_where_it_should(
-    compiled: dict[Format, ctypes.CDLL], name: str, format: Format
-) -> None:
+def test_the_fast_path_ends_where_it_should(compiled: dict[Format, ctypes.CDLL], name: str, fmt: Format) -> None:
     """Both sides of the edge are equally good, so that nobody sees it."""
-    x = np.array([*EDGES[format][name], math.nan, math.inf, -math.inf], REALS[format])
-    _, fine = evaluated(procedure(name, format), x)
+    x = np.array([*EDGES[fmt][name], math.nan, math.inf, -math.inf], REALS[fmt])
+    _, fine = evaluated(procedure(name, fmt), x)
     assert fine.tolist() == [True, False, False, False, False]
     inside, outside = called(compiled, name, x, x)[:2]
-    close, of_angles = CLOSE[format]
+    close, of_angles = CLOSE[fmt]
     assert inside == pytest.approx(outside, rel=of_angles if name in {"sin", "cos", "tan"} else close)
 
 
 @FORMATS
 @pytest.mark.parametrize("name", ["sin", "tan", "sinh", "tanh", "atan", "asin", "cbrt", "sign"])
 def test_odd_functions_are_odd_to_the_bit(
-    compiled: dict[Format, ctypes.CDLL], arguments: Arguments, name: str, format: Format
+    compiled: dict[Format, ctypes.CDLL], arguments: Arguments, name: str, fmt: Format
 ) -> None:
-    x = arguments[format][0]
+    x = arguments[fmt][0]
     assert np.all(same(called(compiled, name, -x, x), -called(compiled, name, x, x)))
 
 
 @FORMATS
 @pytest.mark.parametrize("name", ["cos", "cosh", "fabs"])
 def test_even_functions_are_even_to_the_bit(
-    compiled: dict[Format, ctypes.CDLL], arguments: Arguments, name: str, format: Format
+    compiled: dict[Format, ctypes.CDLL], arguments: Arguments, name: str, fmt: Format
 ) -> None:
-    x = arguments[format][0]
+    x = arguments[fmt][0]
     assert np.all(same(called(compiled, name, -x, x), called(compiled, name, x, x)))
 
 
@@ -281,13 +290,13 @@ def test_no_other_polynomial_stands_there(script: ModuleType) -> None:
 
 
 @FORMATS
-def test_cube_roots_start_within_the_range_of_their_polynomial(script: ModuleType, format: Format) -> None:
+def test_cube_roots_start_within_the_range_of_their_polynomial(script: ModuleType, fmt: Format) -> None:
     """x y^3 repeats with every factor of 8. Floats overshoot by what the digits that they keep do not show."""
-    program = procedure("pow_m1_3", format)
+    program = procedure("pow_m1_3", fmt)
     (place,) = (place for place, name in program.names.items() if name == "u")
-    inner = Procedure(program.steps, (place,), None, 1, format=format)
-    (u,), _ = evaluated(inner, np.linspace(1.0, 8.0, 100_001, dtype=REALS[format]))
-    margin = 0.0 if format is DOUBLE else 2e-4
+    inner = Procedure(program.steps, (place,), None, 1, format=fmt)
+    (u,), _ = evaluated(inner, np.linspace(1.0, 8.0, 100_001, dtype=REALS[fmt]))
+    margin = 0.0 if fmt is DOUBLE else 2e-4
     assert float(script.START.low) - margin < u.min() < 2.67 and 3.15 < u.max() < float(script.START.high) + margin
 
 
@@ -304,7 +313,7 @@ def test_floats_round_the_start_of_a_cube_root_to_few_digits() -> None:
 
 def test_a_float_takes_no_constant_that_it_cannot_hold() -> None:
     assert SINGLE.holds(0.5) and not SINGLE.holds(0.1) and DOUBLE.holds(0.1)
-    for name, (_, inputs) in FUNCTIONS.items():
+    for name in FUNCTIONS:
         for step in procedure(name, SINGLE).steps:
             assert step.op is not Op.REAL_CONSTANT or np.isinf(step.number) or SINGLE.holds(step.number), name
             assert step.op is not Op.BITS_CONSTANT or 0 <= step.number < 2**32, name

@@ -17,7 +17,8 @@ from springline.codegen.kernel import toolchain
 ROOT = Path(__file__).parents[3]
 ROOTS = ("sqrt", "sqrt_soft", "pow_p1_3", "pow_m1_3", "pow_p2_3", "pow_m2_3", "pow_p1_2", "pow_m1_2")
 ARCS = {"atan": "arctan", "asin": "arcsin", "acos": "arccos"}
-ONE = ("exp", "expm1", "sinh", "cosh", "tanh", "log", "log1p", "sin", "cos", "tan", *ARCS, "floor", "ceil", "cbrt", *ROOTS)
+ONE = ("exp", "expm1", "sinh", "cosh", "tanh", "log", "log1p", "sin", "cos", "tan", *ARCS, "floor", "ceil", "cbrt")
+ONE += ROOTS
 EVERYWHERE = (*ONE, "pow_p3_2", "pow_m1", "pow_p2", "pow_p3")
 TWO = ("pow", "hypot", "atan2", "fmin", "fmax", "copysign")
 LOOP = """
