@@ -10,11 +10,12 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import mpmath as mp
+import numpy as np
 
 Real = Any
 """An mpmath number."""
@@ -27,7 +28,11 @@ MARGIN = mp.mpf("1e-5")  # of the interval: arguments are reduced by rounded num
 
 @dataclass(frozen=True, slots=True)
 class Polynomial:
-    """sum c_i x^i ~ exact(x) between low and high; weight times the difference is the error of the function."""
+    """sum c_i x^i ~ exact(x) between low and high; weight times the difference is the error of the function.
+
+    terms    coefficients among doubles
+    singles  coefficients among floats; of either 0, where the format does without
+    """
 
     name: str
     meaning: str
@@ -36,6 +41,7 @@ class Polynomial:
     low: Real
     high: Real
     terms: int
+    singles: int
 
 
 def of_square(function: Callable[[Real], Real]) -> Callable[[Real], Real]:
@@ -48,125 +54,88 @@ def fraction(thirds: int) -> Callable[[Real], Real]:
     return lambda h: ((1 - h) ** (-mp.mpf(thirds) / 3) - 1) / h
 
 
+def _exponential(name: str, meaning: str, largest: Real, terms: int, singles: int) -> Polynomial:
+    return Polynomial(
+        name,
+        meaning,
+        lambda r: (mp.expm1(r) - r) / r**2,
+        lambda r: r**2 / mp.exp(r),
+        -largest * (1 + MARGIN),
+        largest * (1 + MARGIN),
+        terms,
+        singles,
+    )
+
+
+def _logarithm(name: str, meaning: str, largest: Real, terms: int, singles: int) -> Polynomial:
+    return Polynomial(
+        name,
+        meaning,
+        of_square(lambda s: (2 * mp.atanh(s) / s - 2) / s**2),
+        of_square(lambda s: s**3 / (2 * mp.atanh(s))),
+        0,
+        (largest * (1 + MARGIN)) ** 2,
+        terms,
+        singles,
+    )
+
+
+def _odd(
+    name: str, meaning: str, function: Callable[[Real], Real], largest: Real, terms: int, singles: int
+) -> Polynomial:
+    """P of a function r + r^3 P(r^2)."""
+    return Polynomial(
+        name,
+        meaning,
+        of_square(lambda r: (function(r) - r) / r**3),
+        of_square(lambda r: r**3 / function(r)),
+        0,
+        largest**2 * (1 + MARGIN) ** 2,
+        terms,
+        singles,
+    )
+
+
+def _thirds(name: str, thirds: int, largest: str, terms: int, singles: int) -> Polynomial:
+    return Polynomial(
+        name,
+        f"((1 - h)^(-{thirds}/3) - 1) / h, |h| <= {largest}",
+        fraction(thirds),
+        lambda h: h,
+        -mp.mpf(largest),
+        mp.mpf(largest),
+        terms,
+        singles,
+    )
+
+
 def polynomials() -> tuple[Polynomial, ...]:
-    """All but those of the cube roots."""
-    ln2, pi = mp.log(2), mp.pi
-    square, quarter_pi = (1 + MARGIN) ** 2, pi / 4
+    """All but the start of the cube roots."""
+    ln2, quarter_pi = mp.log(2), mp.pi / 4
     root = (mp.sqrt(2) - 1) ** 2  # (m - 1) / (m + 1) at m = sqrt(2)
-
-    def logarithm(s: Real) -> Real:
-        return (2 * mp.atanh(s) / s - 2) / s**2
-
-    def own_share(s: Real) -> Real:
-        return s**3 / (2 * mp.atanh(s))
-
-    def exponential(r: Real) -> Real:
-        return (mp.expm1(r) - r) / r**2
-
-    half_ln2 = ln2 / 2 * (1 + MARGIN)
     return (
-        Polynomial(
-            "EXPM1",
-            "(e^r - 1 - r) / r^2, |r| <= ln 2 / 2",
-            exponential,
-            lambda r: r**2 / mp.exp(r),
-            -half_ln2,
-            half_ln2,
-            10,
-        ),
-        Polynomial(
-            "EXP",
-            "the same, |r| <= ln 2 / 4",
-            exponential,
-            lambda r: r**2 / mp.exp(r),
-            -half_ln2 / 2,
-            half_ln2 / 2,
-            8,
-        ),
-        Polynomial(
-            "LOG",
-            "(2 atanh(s) / s - 2) / z of z = s^2, s <= (sqrt 2 - 1)^2",
-            of_square(logarithm),
-            of_square(own_share),
-            0,
-            root**2 * square,
-            7,
-        ),
-        Polynomial(
-            "LOG1P",
-            "the same, s <= 1 / 5",
-            of_square(logarithm),
-            of_square(own_share),
-            0,
-            square / 25,
-            7,
-        ),
-        Polynomial(
-            "SIN",
-            "(sin r - r) / r^3 of z = r^2, r <= pi / 4",
-            of_square(lambda r: (mp.sin(r) - r) / r**3),
-            of_square(lambda r: r**3 / mp.sin(r)),
-            0,
-            quarter_pi**2 * square,
-            6,
-        ),
+        _exponential("EXPM1", "(e^r - 1 - r) / r^2, |r| <= ln 2 / 2", ln2 / 2, 10, 6),
+        _exponential("EXP", "the same, |r| <= ln 2 / 4", ln2 / 4, 8, 0),
+        _logarithm("LOG", "(2 atanh(s) / s - 2) / z of z = s^2, s <= (sqrt 2 - 1)^2", root, 7, 4),
+        _logarithm("LOG1P", "the same, s <= 1 / 5", mp.mpf(1) / 5, 7, 4),
+        _odd("SIN", "(sin r - r) / r^3 of z = r^2, r <= pi / 4", mp.sin, quarter_pi, 6, 4),
         Polynomial(
             "COS",
             "(cos r - 1 + z / 2) / z^2 of z = r^2, r <= pi / 4",
             of_square(lambda r: (mp.cos(r) - 1 + r**2 / 2) / r**4),
             of_square(lambda r: r**4 / mp.cos(r)),
             0,
-            quarter_pi**2 * square,
+            quarter_pi**2 * (1 + MARGIN) ** 2,
             6,
+            3,
         ),
-        Polynomial(
-            "TAN",
-            "(tan r - r) / r^3 of z = r^2, r <= pi / 4",
-            of_square(lambda r: (mp.tan(r) - r) / r**3),
-            of_square(lambda r: r**3 / mp.tan(r)),
-            0,
-            quarter_pi**2 * square,
-            14,
-        ),
-        Polynomial(
-            "ATAN",
-            "(atan t - t) / t^3 of z = t^2, t <= 7 / 16",
-            of_square(lambda t: (mp.atan(t) - t) / t**3),
-            of_square(lambda t: t**3 / mp.atan(t)),
-            0,
-            (mp.mpf(7) / 16) ** 2 * square,
-            11,
-        ),
-        Polynomial(
-            "ASIN",
-            "(asin s - s) / s^3 of z = s^2, s <= 1 / 2",
-            of_square(lambda s: (mp.asin(s) - s) / s**3),
-            of_square(lambda s: s**3 / mp.asin(s)),
-            0,
-            square / 4,
-            12,
-        ),
-        Polynomial(
-            "POW",
-            "(2 atanh(s) / s - 2) / z of z = s^2, s <= 1 / 16",
-            of_square(logarithm),
-            of_square(own_share),
-            0,
-            square / 256,
-            6,
-        ),
-        *(
-            Polynomial(
-                name,
-                f"((1 - h)^(-{thirds}/3) - 1) / h, |h| <= {largest}",
-                fraction(thirds),
-                lambda h: h,
-                -mp.mpf(largest),
-                mp.mpf(largest),
-                2,
-            )
-            for name, thirds, largest in (("MINUS_ONE_THIRD", 1, "5.64e-6"), ("MINUS_TWO_THIRDS", 2, "2.82e-6"))
-        ),
+        _odd("TAN", "(tan r - r) / r^3 of z = r^2, r <= pi / 4", mp.tan, quarter_pi, 14, 7),
+        _odd("ATAN", "(atan t - t) / t^3 of z = t^2, t <= 7 / 16", mp.atan, mp.mpf(7) / 16, 11, 5),
+        _odd("ASIN", "(asin s - s) / s^3 of z = s^2, s <= 1 / 2", mp.asin, mp.mpf(1) / 2, 12, 6),
+        _logarithm("POW", "(2 atanh(s) / s - 2) / z of z = s^2, s <= 1 / 16", mp.mpf(1) / 16, 6, 3),
+        _thirds("MINUS_ONE_THIRD", 1, "5.64e-6", 2, 0),
+        _thirds("MINUS_TWO_THIRDS", 2, "2.82e-6", 2, 0),
+        _thirds("MINUS_ONE_THIRD_LONG", 1, "1.18e-2", 0, 3),
     )
 
 
@@ -177,6 +146,7 @@ START = Polynomial(
     lambda u: u ** (mp.mpf(1) / 3),
     mp.mpf("2.6653"),
     mp.mpf("3.1590"),
+    4,
     4,
 )
 
@@ -220,20 +190,32 @@ def _exchanged(chosen: list[int], error: list[Real]) -> list[int]:
     return [worst, *chosen[:-1]] if not below else [*chosen[1:], worst]
 
 
-def coefficients(polynomial: Polynomial) -> tuple[float, ...]:
-    """The doubles that stand in the functions."""
+def coefficients(polynomial: Polynomial, single: bool = False) -> tuple[float, ...]:
+    """The doubles that stand in the functions, or the floats."""
+    if single:
+        polynomial = replace(polynomial, terms=polynomial.singles)
+
+    def rounded(x: Real) -> float:
+        return float(np.float32(float(x))) if single else float(x)
+
     with mp.workprec(PRECISION):
         known: list[Real] = []
-        if polynomial.low == 0:
-            for _ in range(2):
-                known.append(mp.mpf(float(best(polynomial, known)[0])))
-        found = [float(each) for each in [*known, *best(polynomial, known)]]
-        if polynomial is not START:
+        if polynomial.low == 0 or (single and polynomial.name != START.name):
+            for _ in range(min(2, polynomial.terms)):
+                known.append(mp.mpf(rounded(best(polynomial, known)[0])))
+        if polynomial.terms == len(known):
+            return tuple(map(float, known))
+        found = [rounded(each) for each in [*known, *best(polynomial, known)]]
+        if polynomial.name != START.name:
             return tuple(found)
         roots = mp.polyroots(best(polynomial, [])[::-1], maxsteps=200, extraprec=PRECISION)
         (real,) = (root for root in roots if mp.im(root) == 0)
         pair = next(root for root in roots if mp.im(root) > 0)
-        return float(real), float(2 * mp.re(pair)), float(abs(pair) ** 2), found[-1]
+        return rounded(real), rounded(2 * mp.re(pair)), rounded(abs(pair) ** 2), found[-1]
+
+
+def _tuple(values: tuple[float, ...], indent: str, end: str) -> list[str]:
+    return [*(f'{indent}float.fromhex("{value.hex()}"),' for value in values), end]
 
 
 def module() -> str:
@@ -241,10 +223,15 @@ def module() -> str:
     with mp.workprec(PRECISION):
         every = (*polynomials(), START)
     lines = ['"""Polynomials of the elementary functions, as benchmarks/math_coefficients.py computes them."""', ""]
+    lines += ["from springline.codegen.elementary.words import Both", ""]
     for polynomial in every:
-        lines += [f"# {polynomial.meaning}", f"{polynomial.name} = ("]
-        lines += [f'    float.fromhex("{value.hex()}"),' for value in coefficients(polynomial)]
-        lines += [")"]
+        double, single = coefficients(polynomial), coefficients(polynomial, single=True)
+        lines += [f"# {polynomial.meaning}"]
+        if double and single:
+            lines += [f"{polynomial.name} = Both(", "    (", *_tuple(double, "        ", "    ),"), "    ("]
+            lines += [*_tuple(single, "        ", "    ),"), ")"]
+        else:
+            lines += [f"{polynomial.name} = (", *_tuple(double or single, "    ", ")")]
     return "\n".join([*lines, ""])
 
 

@@ -1,4 +1,5 @@
 from .functions import procedure as procedure
+from .header import float_header as float_header
 from .header import math_header as math_header
 from .words import COMMUTATIVE as COMMUTATIVE
 from .words import INFIX as INFIX

@@ -5,19 +5,30 @@ from __future__ import annotations
 import sys
 
 from springline.codegen.elementary.coefficients import ASIN, ATAN
-from springline.codegen.elementary.primitives import Computed, absolute, cut, hexadecimal, with_sign
-from springline.codegen.elementary.words import Word, constant, fmax, fmin, if_, named, select, sqrt, true
+from springline.codegen.elementary.primitives import (
+    Computed,
+    absolute,
+    chained,
+    cut,
+    fours,
+    hexadecimal,
+    is_single,
+    with_sign,
+)
+from springline.codegen.elementary.words import Both, Word, constant, fmax, fmin, if_, named, select, sqrt, true
 
-HALF_PI = hexadecimal("0x1.921fb54442d18p+0")
-HALF_PI_LO = hexadecimal("0x1.1a62633145c07p-54")
-QUARTER_PI = hexadecimal("0x1.921fb54442d18p-1")
-QUARTER_PI_LO = hexadecimal("0x1.1a62633145c07p-55")
-PI = hexadecimal("0x1.921fb54442d18p+1")
-PI_LO = hexadecimal("0x1.1a62633145c07p-53")
-ATAN_1_2 = hexadecimal("0x1.dac670561bb4fp-2")
-ATAN_1_2_LO = hexadecimal("0x1.a2b7f222f65e2p-56")
-ATAN_3_2 = hexadecimal("0x1.f730bd281f69bp-1")
-ATAN_3_2_LO = hexadecimal("0x1.007887af0cbbdp-56")
+HALF_PI = Both(hexadecimal("0x1.921fb54442d18p+0"), hexadecimal("0x1.921fb6p+0"))
+HALF_PI_LO = Both(hexadecimal("0x1.1a62633145c07p-54"), hexadecimal("-0x1.777a5cp-25"))
+QUARTER_PI = Both(hexadecimal("0x1.921fb54442d18p-1"), hexadecimal("0x1.921fb6p-1"))
+QUARTER_PI_LO = Both(hexadecimal("0x1.1a62633145c07p-55"), hexadecimal("-0x1.777a5cp-26"))
+PI = Both(hexadecimal("0x1.921fb54442d18p+1"), hexadecimal("0x1.921fb6p+1"))
+PI_LO = Both(hexadecimal("0x1.1a62633145c07p-53"), hexadecimal("-0x1.777a5cp-24"))
+ATAN_1_2 = Both(hexadecimal("0x1.dac670561bb4fp-2"), hexadecimal("0x1.dac67p-2"))
+ATAN_1_2_LO = Both(hexadecimal("0x1.a2b7f222f65e2p-56"), hexadecimal("0x1.586ed4p-28"))
+ATAN_3_2 = Both(hexadecimal("0x1.f730bd281f69bp-1"), hexadecimal("0x1.f730bep-1"))
+ATAN_3_2_LO = Both(hexadecimal("0x1.007887af0cbbdp-56"), hexadecimal("-0x1.afc12cp-26"))
+SMALLEST_NORMAL = Both(sys.float_info.min, 2.0**-126)
+LARGE = Both(2.0**1000, 2.0**100)
 
 
 def _steps(masks: tuple[Word, Word, Word, Word], values: tuple[float, float, float, float]) -> Word:
@@ -40,17 +51,13 @@ def _angle(y: Word, x: Word | float) -> Word:
     first = named("first", true(m1))
     a = named("a", select(m4, constant(0.0), select(m2, constant(1.0), 1.0 + first)))
     b = named("b", select(m4, constant(1.0), select(m3, constant(1.5), first)))
-    hi = named("hi", _steps((m1, m2, m3, m4), (ATAN_1_2, QUARTER_PI, ATAN_3_2, HALF_PI)))
-    lo = named("lo", _steps((m1, m2, m3, m4), (ATAN_1_2_LO, QUARTER_PI_LO, ATAN_3_2_LO, HALF_PI_LO)))
+    hi = named("hi", _steps((m1, m2, m3, m4), (ATAN_1_2(), QUARTER_PI(), ATAN_3_2(), HALF_PI())))
+    lo = named("lo", _steps((m1, m2, m3, m4), (ATAN_1_2_LO(), QUARTER_PI_LO(), ATAN_3_2_LO(), HALF_PI_LO())))
     t = named("t", (a * y - b * x) / (a * x + b * y))
-    c = ATAN
     z = named("z", t * t)
     w = named("w", z * z)
     w2 = named("w2", w * w)
-    p03 = named("p03", (c[0] + z * c[1]) + w * (c[2] + z * c[3]))
-    p47 = named("p47", (c[4] + z * c[5]) + w * (c[6] + z * c[7]))
-    p8a = named("p8a", (c[8] + z * c[9]) + w * c[10])
-    p = named("p", p03 + w2 * (p47 + w2 * p8a))
+    p = named("p", chained(fours(ATAN(), z, w), w2))
     return named("angle", hi + (t + (lo + (t * z) * p)))
 
 
@@ -61,7 +68,7 @@ def angle(y: Word, x: Word) -> Computed:
 
 def atan(x: Word) -> Computed:
     """The angle of x to 1."""
-    return (with_sign(_angle(named("y", fmin(constant(2.0**1000), absolute(x))), 1.0), x),), None
+    return (with_sign(_angle(named("y", fmin(constant(LARGE()), absolute(x))), 1.0), x),), None
 
 
 def atan2(y: Word, x: Word) -> Computed:
@@ -69,8 +76,8 @@ def atan2(y: Word, x: Word) -> Computed:
     a = named("abs_y", absolute(y))
     b = named("abs_x", absolute(x))
     first = _angle(a, b)
-    reflected = named("reflected", select(x < 0.0, PI - (first - PI_LO), first))
-    least, most = 2.0**-1000, 2.0**1000
+    reflected = named("reflected", select(x < 0.0, PI() - (first - PI_LO()), first))
+    least, most = 1.0 / LARGE(), LARGE()
     fine = ((a > least) & (a < most)) & ((b > least) & (b < most))
     return (with_sign(reflected, y),), fine
 
@@ -85,23 +92,22 @@ def _halves(x: Word) -> tuple[Word, Word, Word, Word, Word]:
     z = named("z", select(small, a * a, 0.5 * (1.0 - a)))
     s = named("s", sqrt(z))
     sh = named("sh", cut(s))
-    sl = named("sl", (z - sh * sh) / fmax(constant(sys.float_info.min), s + sh))
-    c = ASIN
+    sl = named("sl", (z - sh * sh) / fmax(constant(SMALLEST_NORMAL()), s + sh))
     w = named("w", z * z)
     w2 = named("w2", w * w)
-    p03 = named("p03", (c[0] + z * c[1]) + w * (c[2] + z * c[3]))
-    p47 = named("p47", (c[4] + z * c[5]) + w * (c[6] + z * c[7]))
-    p8b = named("p8b", (c[8] + z * c[9]) + w * (c[10] + z * c[11]))
-    return small, s, sh, sl, named("tail", z * (p03 + w2 * (p47 + w2 * p8b)))
+    return small, s, sh, sl, named("tail", z * chained(fours(ASIN(), z, w), w2))
 
 
 def asin(x: Word) -> Computed:
     """The leading parts, which are exact, are added last."""
     small, s, sh, sl, tail = _halves(x)
     a = named("abs_x", absolute(x))
-    p = named("p", (2.0 * s) * tail - (HALF_PI_LO - 2.0 * sl))
-    q = named("q", QUARTER_PI - 2.0 * sh)
-    large = named("large", QUARTER_PI - (p - q))
+    p = named("p", (2.0 * s) * tail - (HALF_PI_LO() - 2.0 * sl))
+    if is_single():  # the low part of pi/2 is no small one there: asin 1 would be the float below
+        large = named("large", (HALF_PI() - 2.0 * sh) - p)
+    else:
+        q = named("q", QUARTER_PI() - 2.0 * sh)
+        large = named("large", QUARTER_PI() - (p - q))
     return (with_sign(named("size", select(small, a + a * tail, large)), x),), None
 
 
@@ -109,6 +115,6 @@ def acos(x: Word) -> Computed:
     """pi/2 - asin x, or twice asin s."""
     small, s, sh, sl, tail = _halves(x)
     w = named("rest", s * tail)
-    half = named("half", select(x < 0.0, HALF_PI - (s + (w - HALF_PI_LO)), sh + (w + sl)))
-    middle = named("middle", HALF_PI - (x - (HALF_PI_LO - x * tail)))
+    half = named("half", select(x < 0.0, HALF_PI() - (s + (w - HALF_PI_LO())), sh + (w + sl)))
+    middle = named("middle", HALF_PI() - (x - (HALF_PI_LO() - x * tail)))
     return (select(small, middle, half + half),), None

@@ -1,7 +1,7 @@
 """exp, expm1 and the hyperbolic functions: x = k ln 2 + r, |r| <= ln 2 / 2, exp r = 1 + r + r^2 P(r).
 
-exp itself takes x = n ln 2 / 2 + r, which halves r and saves two coefficients. The root of 2 is not exact there, which
-costs 0.4 ulp; what else is made of exp does without that.
+On doubles exp itself takes x = n ln 2 / 2 + r, which halves r and saves two coefficients. The root of 2 is not exact
+there, which costs 0.4 ulp; what else is made of exp does without that, and so do floats.
 """
 
 from __future__ import annotations
@@ -13,60 +13,73 @@ from springline.codegen.elementary.primitives import (
     ROUND,
     Computed,
     absolute,
+    chained,
+    fours,
     hexadecimal,
+    in_pairs,
+    is_single,
     one,
+    to_field,
+    top,
     with_sign,
 )
-from springline.codegen.elementary.words import Word, bits, constant, fmin, named, pick, real, select
+from springline.codegen.elementary.words import Both, Word, bits, constant, fmin, named, pick, real, select
 
-PER_LN2 = hexadecimal("0x1.71547652b82fep+0")
+PER_LN2 = Both(hexadecimal("0x1.71547652b82fep+0"), hexadecimal("0x1.715476p+0"))
 ROOT_2_SHIFTED = hexadecimal("0x1.ea09e667f3bcdp-1")  # the bits of sqrt(2) less 2^51
-LARGEST = 708.0  # below it k can be added to the exponent of the result
+LARGEST = Both(708.0, 87.0)  # below it k can be added to the exponent of the result
+SMALL_TANH = Both(0.55, hexadecimal("0x1.1ap-1"))
 
 
 def _power(x: Word) -> tuple[Word, Word]:
     """ROUND + k, whose low bits are k; and k."""
-    t = named("t", x * PER_LN2 + ROUND)
-    return t, named("k", t - ROUND)
+    t = named("t", x * PER_LN2() + ROUND())
+    return t, named("k", t - ROUND())
 
 
 def _series(r: Word) -> Word:
     """r^2 P(r)."""
-    c = EXPM1
     r2 = named("r2", r * r)
+    if is_single():
+        return r2 * named("p", in_pairs(EXPM1(), r, r2))
     r4 = named("r4", r2 * r2)
-    low = named("p03", (c[0] + r * c[1]) + r2 * (c[2] + r * c[3]))
-    middle = named("p47", (c[4] + r * c[5]) + r2 * (c[6] + r * c[7]))
-    high = named("p89", c[8] + r * c[9])
-    return r2 * (low + r4 * (middle + r4 * high))
+    return r2 * chained(fours(EXPM1(), r, r2), r4)
 
 
 def significand(hi: Word, lo: Word | None = None) -> tuple[Word, Word, Word]:
-    """m, t, k: exp(hi + lo) = m 2^k, the low bits of t are k. Without lo, r is k ln 2 less in two steps."""
+    """m, t, k: exp(hi + lo) = m 2^k, the low bits of t are k. Without lo, r is k ln 2 less in two steps.
+
+    Floats add the exact part of r apart from the rest.
+    """
     t, k = _power(hi)
-    small = k * LN2_LO
-    r = named("r", (hi - k * LN2_HI) - (small if lo is None else small - lo))
+    small = k * LN2_LO()
+    if is_single():
+        exact = named("exact", hi - k * LN2_HI())
+        rest = named("rest", small if lo is None else small - lo)
+        return named("m", 1.0 + (exact - (rest - _series(named("r", exact - rest))))), t, k
+    r = named("r", (hi - k * LN2_HI()) - (small if lo is None else small - lo))
     return named("m", 1.0 + (r + _series(r))), t, k
 
 
 def scaled(m: Word, t: Word) -> Word:
     """m 2^k."""
-    return real(bits(m) + (bits(t) << 52))
+    return real(bits(m) + to_field(bits(t)))
 
 
 def exp(x: Word) -> Computed:
     """s + s (r + r^2 P(r)) with s = 2^(n/2); adding n << 51 to the bits of its significand makes it."""
-    c = EXP
-    t = named("t", x * (2.0 * PER_LN2) + ROUND)
-    n = named("n", t - ROUND)
-    r = named("r", (x - n * (0.5 * LN2_HI)) - n * (0.5 * LN2_LO))
+    if is_single():
+        m, t, _ = significand(x)
+        return (scaled(m, t),), absolute(x) < LARGEST()
+    t = named("t", x * (2.0 * PER_LN2()) + ROUND())
+    n = named("n", t - ROUND())
+    r = named("r", (x - n * (0.5 * LN2_HI())) - n * (0.5 * LN2_LO()))
     r2 = named("r2", r * r)
     r4 = named("r4", r2 * r2)
-    low = named("p03", (c[0] + r * c[1]) + r2 * (c[2] + r * c[3]))
-    high = named("p47", (c[4] + r * c[5]) + r2 * (c[6] + r * c[7]))
-    root = named("root", pick(bits(t) << 63, 1.0, ROOT_2_SHIFTED))
+    parts = fours(EXP, r, r2)
+    root = named("root", pick(top(bits(t)), 1.0, ROOT_2_SHIFTED))
     s = named("s", real(bits(root) + (bits(t) << 51)))
-    return (s + s * (r + r2 * (low + r4 * high)),), absolute(x) < LARGEST
+    return (s + s * (r + r2 * chained(parts, r4)),), absolute(x) < LARGEST()
 
 
 def exp_parts(hi: Word, lo: Word) -> Computed:
@@ -81,16 +94,16 @@ def _less_one(x: Word) -> tuple[Word, Word]:
     Signs are such that -0 is the result for -0.
     """
     t, k = _power(x)
-    rh = named("rh", x - k * LN2_HI)
-    rl = named("rl", k * LN2_LO)
-    s = named("s", real((bits(t) << 52) + one()))
+    rh = named("rh", x - k * LN2_HI())
+    rl = named("rl", k * LN2_LO())
+    s = named("s", real(to_field(bits(t)) + one()))
     return named("large", s * rh - (1.0 - s)), named("small", s * (rl - _series(named("r", rh - rl))))
 
 
 def expm1(x: Word) -> Computed:
     """The sum of both parts."""
     large, small = _less_one(x)
-    return (large - small,), absolute(x) < LARGEST
+    return (large - small,), absolute(x) < LARGEST()
 
 
 def _less_one_twice(x: Word) -> tuple[Word, Word]:
@@ -105,7 +118,7 @@ def cosh(x: Word) -> Computed:
     a = named("a", absolute(x))
     m, t, _ = significand(a)
     e = named("e", scaled(m, t))
-    return (0.5 * e + 0.5 / e,), a < LARGEST
+    return (0.5 * e + 0.5 / e,), a < LARGEST()
 
 
 def sinh(x: Word) -> Computed:
@@ -116,7 +129,7 @@ def sinh(x: Word) -> Computed:
     q = named("q", e / u)
     v = named("v", 1.0 - q)
     rest = named("rest", lo * (1.0 + v * v) - (q * v) * (e - (u - 1.0)))
-    return (with_sign(named("size", 0.5 * (e + (q + rest))), x),), a < LARGEST
+    return (with_sign(named("size", 0.5 * (e + (q + rest))), x),), a < LARGEST()
 
 
 def tanh(x: Word) -> Computed:
@@ -124,7 +137,7 @@ def tanh(x: Word) -> Computed:
     a = named("a", absolute(x))
     e, lo = _less_one_twice(named("twice", 2.0 * fmin(constant(30.0), a)))
     u = named("u", 2.0 + e)
-    small = named("is_small", a < 0.55)
+    small = named("is_small", a < SMALL_TANH())
     q = named("q", select(small, e, constant(2.0)) / u)
     other = named("other", 1.0 - q)
     v = named("v", 0.5 * other)

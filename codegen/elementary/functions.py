@@ -10,7 +10,7 @@ from functools import cache
 
 from springline.codegen.elementary import arcs, circular, exponential, logarithm, power, primitives, roots
 from springline.codegen.elementary.primitives import Computed
-from springline.codegen.elementary.words import Procedure, trace
+from springline.codegen.elementary.words import DOUBLE, Format, Procedure, trace
 
 FUNCTIONS: dict[str, tuple[Callable[..., Computed], int]] = {
     "fabs": (primitives.fabs, 1),
@@ -53,7 +53,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Computed], int]] = {
 
 
 @cache
-def procedure(name: str) -> Procedure:
+def procedure(name: str, fmt: Format = DOUBLE) -> Procedure:
     """The steps of an elementary function."""
     function, inputs = FUNCTIONS[name]
-    return trace(function, inputs)
+    return trace(function, inputs, fmt)

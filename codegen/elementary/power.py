@@ -1,7 +1,7 @@
 """pow for exponents without a function of their own: y log x as a sum of two numbers, then exp.
 
-x = 2^k m; m / c is near 1 for one of four 26-bit numbers c whose logarithms are almost doubles; s = (m - c) / (m + c)
-as sh + sl, log m = log c + 2 atanh s.
+x = 2^k m; m / c is near 1 for one of four numbers c whose logarithms are almost numbers of the format;
+s = (m - c) / (m + c) as sh + sl, log m = log c + 2 atanh s.
 """
 
 from __future__ import annotations
@@ -18,19 +18,26 @@ from springline.codegen.elementary.primitives import (
     cut,
     exponent,
     hexadecimal,
+    in_pairs,
     is_normal,
 )
-from springline.codegen.elementary.words import Word, below, bits, constant, named, pick, real
+from springline.codegen.elementary.words import Both, Word, below, bits, constant, named, pick, real, traced_format
 
-START = 0x3FED580000000000
-CENTERS = (1.0, hexadecimal("0x1.2d26acp+0"), hexadecimal("0x1.72d4cp+0"), hexadecimal("0x1.b372a8p+0"))
-LOGARITHMS = (
-    0.0,
-    hexadecimal("0x1.4caa7dcbe8acfp-3"),
-    hexadecimal("0x1.7b7679c3bb462p-2"),
-    hexadecimal("0x1.0ff923a807833p-1"),
+START = Both(0x3FED580000000000, 0x3F6AC000)
+CENTERS = Both(
+    (1.0, hexadecimal("0x1.2d26acp+0"), hexadecimal("0x1.72d4cp+0"), hexadecimal("0x1.b372a8p+0")),
+    (1.0, hexadecimal("0x1.33c04ep+0"), hexadecimal("0x1.74cbd2p+0"), hexadecimal("0x1.b3b8fp+0")),
 )
-ALTERNATING = 0xAAAAAAAAAAAAA000  # the fraction of 1/3 and 2/3 below its first bit
+LOGARITHMS = Both(
+    (
+        0.0,
+        hexadecimal("0x1.4caa7dcbe8acfp-3"),
+        hexadecimal("0x1.7b7679c3bb462p-2"),
+        hexadecimal("0x1.0ff923a807833p-1"),
+    ),
+    (0.0, hexadecimal("0x1.7910dcp-3"), hexadecimal("0x1.80dff8p-2"), hexadecimal("0x1.104bcp-1")),
+)
+ALTERNATING = Both(0xAAAAAAAAAAAAA000, 0xAAAAAC00)  # the fraction of 1/3 and 2/3 below its first bit
 
 
 def _choose(first: Word, second: Word, values: tuple[float, float, float, float]) -> Word:
@@ -41,11 +48,12 @@ def _choose(first: Word, second: Word, values: tuple[float, float, float, float]
 def _log(shifted: Word, y: Word, bias: Word | float) -> tuple[Word, Word]:
     """hi + lo = y log x to about 2^-63 relative, for normal positive x with its bits less START."""
     k = named("k", exponent(shifted) - bias)
-    m = named("m", real((shifted & FRACTION) + START))
-    first = named("first", shifted << 12)
-    second = named("second", shifted << 13)
-    c = named("c", _choose(first, second, CENTERS))
-    log_c = named("log_c", _choose(first, second, LOGARITHMS))
+    m = named("m", real((shifted & FRACTION()) + START()))
+    fraction = traced_format().width - traced_format().digits + 1
+    first = named("first", shifted << fraction)
+    second = named("second", shifted << fraction + 1)
+    c = named("c", _choose(first, second, CENTERS()))
+    log_c = named("log_c", _choose(first, second, LOGARITHMS()))
     f = named("f", m - c)
     u = named("u", m + c)
     v = named("v", 1.0 / u)
@@ -56,13 +64,13 @@ def _log(shifted: Word, y: Word, bias: Word | float) -> tuple[Word, Word]:
     ds = named("ds", (sh - s) + sl)  # s + ds is the better s
     z = named("z", s * s)
     w = named("w", z * z)
-    p = named("p", (POW[0] + z * POW[1]) + w * ((POW[2] + z * POW[3]) + w * (POW[4] + z * POW[5])))
-    kl = named("kl", k * LN2_HI)
+    p = named("p", in_pairs(POW(), z, w))
+    kl = named("kl", k * LN2_HI())
     t = named("tk", kl + log_c)
     tl = named("tl", (kl - t) + log_c)
     sh2 = named("sh2", sh + sh)
     h = named("h", t + sh2)
-    rest = named("rest", (tl + k * LN2_LO) + ((sl + sl) + (z + z) * ds))
+    rest = named("rest", (tl + k * LN2_LO()) + ((sl + sl) + (z + z) * ds))
     low = named("low", (((t - h) + sh2) + rest) + (s * z) * p)
     lh = named("lh", cut(h + low))
     ll = named("ll", (h - lh) + low)
@@ -71,10 +79,10 @@ def _log(shifted: Word, y: Word, bias: Word | float) -> tuple[Word, Word]:
 
 
 def _general(x: Word, y: Word) -> tuple[Word, Word]:
-    shifted = named("shifted", bits(x) - START)
-    hi, lo = _log(shifted, y, FIELD_BIAS)
+    shifted = named("shifted", bits(x) - START())
+    hi, lo = _log(shifted, y, FIELD_BIAS())
     m, t, _ = significand(hi, lo)
-    return named("r", scaled(m, t)), is_normal(shifted, START) & (absolute(hi) < LARGEST)
+    return named("r", scaled(m, t)), is_normal(shifted, START()) & (absolute(hi) < LARGEST())
 
 
 def pow_general(x: Word, y: Word) -> Computed:
@@ -86,10 +94,10 @@ def pow_general(x: Word, y: Word) -> Computed:
 def pow_(x: Word, y: Word) -> Computed:
     """x^y where y has no function of its own, by the bits of its fraction."""
     r, fine = _general(x, y)
-    low = named("fraction", bits(y) << 13)
-    return (r,), fine & ~(below(low, 1) | below(low ^ ALTERNATING, 1))
+    low = named("fraction", bits(y) << traced_format().width - traced_format().digits + 2)
+    return (r,), fine & ~(below(low, 1) | below(low ^ ALTERNATING(), 1))
 
 
 def pow_log(x: Word, y: Word, bias: Word) -> Computed:
     """The logarithm alone, for x that was scaled."""
-    return _log(named("shifted", bits(x) - START), y, bias), None
+    return _log(named("shifted", bits(x) - START()), y, bias), None

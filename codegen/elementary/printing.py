@@ -5,20 +5,23 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
 
 from springline.codegen.elementary.primitives import (
     FIELD_BIAS,
     FRACTION,
-    HIGH_26,
+    HIGH_HALF,
     LN2_HI,
     LN2_LO,
     ONE,
     ROUND,
     SIGN_BIT,
 )
-from springline.codegen.elementary.words import INFIX, Kind, Op, Procedure, Step
+from springline.codegen.elementary.words import DOUBLE, INFIX, SINGLE, Both, Format, Kind, Op, Procedure, Step
 
-_TYPES = {Kind.REAL: "SL_F", Kind.BITS: "SL_B", Kind.MASK: "SL_M"}
+T = TypeVar("T")
+
 _MIRRORED = {"<": ">", "<=": ">="}
 _CALLS = (
     Op.SQRT,
@@ -34,39 +37,59 @@ _CALLS = (
 )
 _FREE = (Op.INPUT, Op.REAL_CONSTANT, Op.BITS_CONSTANT, Op.BITS, Op.REAL)
 
-_NUMBERS = {ROUND: "SL_ROUND", LN2_HI: "SL_LN2_HI", LN2_LO: "SL_LN2_LO", FIELD_BIAS: "SL_FIELD_BIAS"}
-_PATTERNS = {
-    SIGN_BIT: "SL_SIGN_BIT",
-    SIGN_BIT - 1: "~SL_SIGN_BIT",
-    FRACTION: "SL_FRACTION",
-    2**64 - 1 - FRACTION: "~SL_FRACTION",
-    ONE: "SL_ONE",
-    HIGH_26: "SL_HIGH_26",
-}
-"""Constants that sl_math.h has a name for."""
+_NUMBERS = {"ROUND": ROUND, "LN2_HI": LN2_HI, "LN2_LO": LN2_LO, "FIELD_BIAS": FIELD_BIAS}
+_PATTERNS = {"SIGN_BIT": SIGN_BIT, "FRACTION": FRACTION, "ONE": ONE}
+"""Constants that the headers have a name for."""
+
+
+class _Dialect:
+    """How a format's C looks: doubles in the macros that make scalar and lanes of it, floats as they are."""
+
+    def __init__(self, fmt: Format) -> None:
+        def of(both: Both[T]) -> T:
+            return both.double if fmt is DOUBLE else both.single
+
+        prefix, high = ("SL", "HIGH_26") if fmt is DOUBLE else ("SLF", "HIGH_12")
+        self.format, self.prefix = fmt, prefix
+        self.types = {Kind.REAL: "SL_F", Kind.BITS: "SL_B", Kind.MASK: "SL_M"}
+        if fmt is SINGLE:
+            self.types = {Kind.REAL: "float", Kind.BITS: "uint32_t", Kind.MASK: "int"}
+        self.suffix = "f" if fmt is SINGLE else ""
+        self._numbers = {of(value): f"{prefix}_{name}" for name, value in _NUMBERS.items()}
+        self._patterns = {of(value): f"{prefix}_{name}" for name, value in _PATTERNS.items()}
+        for name in ("SIGN_BIT", "FRACTION"):
+            self._patterns[2**fmt.width - 1 - of(_PATTERNS[name])] = f"~{prefix}_{name}"
+        self._patterns[of(HIGH_HALF)] = f"{prefix}_{high}"
+        self.sign_bit = of(SIGN_BIT)
+
+    def function(self, name: str) -> str:
+        """C of what a function is called."""
+        return f"SL_FN({name})" if self.format is DOUBLE else f"slf_{name}"
+
+    def number(self, value: float) -> str:
+        """C of a real constant."""
+        if value < 0.0:
+            return f"-{self.number(-value)}"
+        if math.isinf(value):
+            return f"{self.prefix}_INF"
+        if value in self._numbers:
+            return self._numbers[value]
+        if len(repr(value)) <= _SHORT:
+            return f"{value!r}{self.suffix}"
+        digits, _, exponent = value.hex().partition("p")
+        return f"{digits.rstrip('0').rstrip('.')}p{exponent}{self.suffix}"
+
+    def pattern(self, value: int) -> str:
+        """C of the bits of a number."""
+        digits = self.format.width // 4
+        return self._patterns.get(value, f"UINT{self.format.width}_C(0x{value:0{digits}x})")
+
+
+_DIALECTS = {each: _Dialect(each) for each in (DOUBLE, SINGLE)}
 
 LINE = 100
 _LONGER = 10  # steps; copysign itself has so many
 _SHORT = 8  # characters of a decimal number that a reader prefers to its hexadecimal digits
-
-
-def number(value: float) -> str:
-    """C of a real constant."""
-    if value < 0.0:
-        return f"-{number(-value)}"
-    if math.isinf(value):
-        return "SL_INF"
-    if value in _NUMBERS:
-        return _NUMBERS[value]
-    if len(repr(value)) <= _SHORT:
-        return repr(value)
-    digits, _, exponent = value.hex().partition("p")
-    return f"{digits.rstrip('0').rstrip('.')}p{exponent}"
-
-
-def pattern(value: int) -> str:
-    """C of 64 bits."""
-    return _PATTERNS.get(value, f"UINT64_C(0x{value:016x})")
 
 
 class Statements:
@@ -77,6 +100,7 @@ class Statements:
     """
 
     def __init__(self, procedure: Procedure, inputs: Sequence[str], results: Sequence[str]) -> None:
+        self._dialect = _DIALECTS[procedure.format]
         self._steps = procedure.steps
         self._idioms = len(procedure.steps) > _LONGER
         self._inputs = inputs
@@ -90,7 +114,7 @@ class Statements:
         for i in sorted(needed):
             assert uses[i] < 2 or i in self._names or self._steps[i].op in _FREE, (procedure.names, i, self._steps[i])
         self.lines = [
-            f"const {_TYPES[self._steps[i].op.kind]} {self._names[i]} = {self._right(i)};"
+            f"const {self._dialect.types[self._steps[i].op.kind]} {self._names[i]} = {self._right(i)};"
             for i in sorted(needed)
             if i in self._names
         ]
@@ -110,19 +134,22 @@ class Statements:
     def _right(self, place: int) -> str:
         """The right side of an assignment."""
         text = self._text(place, self._steps[place])
-        return f"SL_FN(set)({text})" if self._steps[place].op is Op.REAL_CONSTANT else text
+        constant = self._steps[place].op is Op.REAL_CONSTANT and self._dialect.format is DOUBLE
+        return f"{self._dialect.function('set')}({text})" if constant else text
 
     def _idiom(self, place: int) -> str | None:
         """|x|, or |x| with the sign of another."""
-        if isinstance(size := self._masked(place, SIGN_BIT - 1), int):
-            return f"SL_FN(fabs)({self._argument(size)})"
+        if isinstance(size := self._masked(place, self._dialect.sign_bit - 1), int):
+            return f"{self._dialect.function('fabs')}({self._argument(size)})"
         if self._steps[place].op is Op.BIT_OR:
             size, sign = (
                 self._masked(each, mask)
-                for each, mask in zip(self._steps[place].arguments, (SIGN_BIT - 1, SIGN_BIT), strict=True)
+                for each, mask in zip(
+                    self._steps[place].arguments, (self._dialect.sign_bit - 1, self._dialect.sign_bit), strict=True
+                )
             )
             if size is not None and sign is not None:
-                return f"SL_FN(copysign)({self._argument(size)}, {self._argument(sign)})"
+                return f"{self._dialect.function('copysign')}({self._argument(size)}, {self._argument(sign)})"
         return None
 
     def _masked(self, place: int, mask: int) -> int | None:
@@ -141,22 +168,26 @@ class Statements:
             case Op.INPUT:
                 return self._inputs[int(step.number)]
             case Op.REAL_CONSTANT:
-                return number(step.number)
+                return self._dialect.number(step.number)
             case Op.BITS_CONSTANT:
-                return pattern(int(step.number))
+                return self._dialect.pattern(int(step.number))
             case Op.NEG:
                 return f"-{self._operand(arguments[0])}"
             case Op.SHIFT_LEFT | Op.SHIFT_RIGHT:
                 sign = "<<" if step.op is Op.SHIFT_LEFT else ">>"
                 return f"{self._operand(arguments[0])} {sign} {step.number}"
             case Op.BELOW:
-                return f"SL_FN(below)({self._argument(arguments[0])}, UINT64_C(0x{step.number:x}))"
+                limit = f"UINT{self._dialect.format.width}_C(0x{step.number:x})"
+                return f"{self._dialect.function('below')}({self._argument(arguments[0])}, {limit})"
         if step.op in _CALLS:
-            return f"SL_FN({step.op.value[0]})({', '.join(self._argument(each) for each in arguments)})"
+            called = ", ".join(self._argument(each) for each in arguments)
+            return f"{self._dialect.function(step.op.value[0])}({called})"
         left, right = (self._operand(each) for each in arguments)
         sign = INFIX[step.op]
         if sign in _MIRRORED and self._steps[arguments[0]].op is Op.REAL_CONSTANT:
             return f"{right} {_MIRRORED[sign]} {left}"
+        if sign == "-" and right.startswith("-"):
+            right = f"({right})"
         return f"{left} {sign} {right}"
 
     def _argument(self, place: int) -> str:
@@ -205,38 +236,41 @@ def _broken(line: str) -> Iterator[str]:
 def checked(name: str, procedure: Procedure, inputs: Sequence[str], results: Mapping[str, str]) -> str:
     """A function that holds nearly everywhere.
 
-    results  name of a result -> the scalar function sl_<...> that has it elsewhere; several results go where
-             arguments with these names point to
+    results  name of a result -> the scalar function sl_<...> or slf_<...> that has it elsewhere; several results go
+             where arguments with these names point to
     """
-    code = Statements(procedure, inputs, [*results])
-    parameters = ", ".join(f"SL_F {each}" for each in inputs)
+    code, single = Statements(procedure, inputs, [*results]), procedure.format is SINGLE
+    real = _DIALECTS[procedure.format].types[Kind.REAL]
+    head, end = (f"slf_{name}", "") if single else (f"SL_CHECKED({name})", " SL_OK")
     patch, arguments = f"SL_PATCH{len(inputs)}", ", ".join(inputs)
+
+    def patched(result: str, rare: str) -> str:
+        if single:
+            return f"if (!SLF_LIKELY(usual)) {result} = slf_{rare}({arguments});"
+        return f"{patch}({code.fine}, {result}, {rare}, {arguments});"
 
     def body() -> Iterator[str]:
         yield from code.lines
+        if single:
+            yield f"const int usual = {code.fine};"
         if len(results) == 1:
             ((result, rare),), (value,) = results.items(), code.results
-            yield f"SL_F {result} = {value};"
-            yield f"{patch}({code.fine}, {result}, {rare}, {arguments});"
+            yield f"{real} {result} = {value};"
+            yield patched(result, rare)
             yield f"return {result};"
             return
         for result, value in zip(results, code.results, strict=True):
             yield f"*{result} = {value};"
         for result, rare in results.items():
-            yield f"{patch}({code.fine}, *{result}, {rare}, {arguments});"
+            yield patched(f"*{result}", rare)
 
-    if len(results) == 1:
-        return _define(f"static inline SL_F SL_CHECKED({name})({parameters} SL_OK)", body())
-    pointers = ", ".join(f"SL_F *{each}" for each in results)
-    return _define(f"static inline void SL_CHECKED({name})({parameters}, {pointers} SL_OK)", body())
+    return _function(head, real, inputs, [*results], body(), end)
 
 
 def plain(name: str, procedure: Procedure, inputs: Sequence[str], results: Sequence[str] = ("result",)) -> str:
     """A function that holds everywhere, or of which it does not matter where."""
-    code = Statements(
-        Procedure(procedure.steps, procedure.results, None, procedure.inputs, procedure.names), inputs, results
-    )
-    parameters = ", ".join(f"SL_F {each}" for each in inputs)
+    code = Statements(replace(procedure, fine=None), inputs, results)
+    dialect = _DIALECTS[procedure.format]
 
     def body() -> Iterator[str]:
         yield from code.lines
@@ -246,7 +280,13 @@ def plain(name: str, procedure: Procedure, inputs: Sequence[str], results: Seque
             for result, value in zip(results, code.results, strict=True):
                 yield f"*{result} = {value};"
 
-    if len(results) == 1:
-        return _define(f"static inline SL_F SL_FN({name})({parameters})", body())
-    pointers = ", ".join(f"SL_F *{each}" for each in results)
-    return _define(f"static inline void SL_FN({name})({parameters}, {pointers})", body())
+    return _function(dialect.function(name), dialect.types[Kind.REAL], inputs, results, body())
+
+
+def _function(
+    head: str, real: str, inputs: Sequence[str], results: Sequence[str], body: Iterator[str], end: str = ""
+) -> str:
+    """One result is returned; several go where arguments point to."""
+    pointers = [f"{real} *{each}" for each in results] if len(results) > 1 else []
+    parameters = ", ".join([*(f"{real} {each}" for each in inputs), *pointers])
+    return _define(f"static inline {'void' if pointers else real} {head}({parameters}{end})", body)

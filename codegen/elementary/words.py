@@ -1,17 +1,42 @@
 """Programs of primitive operations, as a processor has them: what the elementary functions are written in.
 
-A function is written once, on Words: symbols of a real number, of its 64 bits, or of a truth value. `trace` runs it
-and notes its steps in order, equal ones once. Printers make scalar C, lanes and blocks of those steps; none of them
-regroups anything, so they all compute the same bits.
+A function is written once, on Words: symbols of a real number, of its bits, or of a truth value. `trace` runs it for
+one Format of real numbers and notes its steps in order, equal ones once. Printers make scalar C, lanes and blocks of
+those steps; none of them regroups anything, so they all compute the same bits.
 """
 
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format of real numbers: its name in C, all bits and the significant ones."""
+
+    name: str
+    width: int
+    digits: int
+
+    def holds(self, value: float) -> bool:
+        """Whether a number is one of the format's."""
+        return not math.isfinite(value) or struct.unpack(self._code, struct.pack(self._code, value)) == (value,)
+
+    @property
+    def _code(self) -> str:
+        return {32: "<f", 64: "<d"}[self.width]
+
+
+DOUBLE = Format("double", 64, 53)
+SINGLE = Format("float", 32, 24)
 
 
 class Kind(Enum):
@@ -105,6 +130,7 @@ class Procedure:
     fine     the step, a mask, that tells where they hold; None if everywhere
     inputs   how many
     names    what a reader calls a step
+    format   of the real numbers
     """
 
     steps: tuple[Step, ...]
@@ -112,6 +138,7 @@ class Procedure:
     fine: int | None
     inputs: int
     names: Mapping[int, str] = field(default_factory=dict, compare=False)
+    format: Format = DOUBLE
 
     @property
     def needed(self) -> tuple[int, ...]:
@@ -127,7 +154,8 @@ class Procedure:
 
 
 class _Trace:
-    def __init__(self) -> None:
+    def __init__(self, fmt: Format) -> None:
+        self.format = fmt
         self.steps: list[Step] = []
         self.names: dict[int, str] = {}
         self._places: dict[object, int] = {}
@@ -142,6 +170,23 @@ class _Trace:
 
 
 _CURRENT: ContextVar[_Trace] = ContextVar("trace")
+
+
+def traced_format() -> Format:
+    """The format that the function being traced is for."""
+    return _CURRENT.get().format
+
+
+@dataclass(frozen=True, slots=True)
+class Both(Generic[T]):
+    """A constant that each format has its own of; called, the one of the format being traced."""
+
+    double: T
+    single: T
+
+    def __call__(self) -> T:
+        """The one of the format being traced."""
+        return self.double if traced_format() is DOUBLE else self.single
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -233,17 +278,18 @@ def constant(value: float, kind: Kind = Kind.REAL) -> Word:
     """The Word of a number."""
     if kind is Kind.BITS:
         assert isinstance(value, int)
-        return _CURRENT.get().word(Op.BITS_CONSTANT, (), value % 2**64)
+        return _CURRENT.get().word(Op.BITS_CONSTANT, (), value % 2 ** traced_format().width)
+    assert traced_format().holds(value), value
     return _CURRENT.get().word(Op.REAL_CONSTANT, (), float(value))
 
 
 def bits(x: Word) -> Word:
-    """The 64 bits of a real number."""
+    """The bits of a real number."""
     return operation(Op.BITS, x)
 
 
 def real(b: Word) -> Word:
-    """The real number of these 64 bits."""
+    """The real number of these bits."""
     return operation(Op.REAL, b)
 
 
@@ -298,9 +344,11 @@ def below(b: Word, limit: int) -> Word:
     return _CURRENT.get().word(Op.BELOW, [b.place], limit)
 
 
-def trace(function: Callable[..., tuple[tuple[Word, ...], Word | None]], inputs: int) -> Procedure:
+def trace(
+    function: Callable[..., tuple[tuple[Word, ...], Word | None]], inputs: int, fmt: Format = DOUBLE
+) -> Procedure:
     """Run a function of so many Words, which returns its results and where they hold, and note its steps."""
-    current = _Trace()
+    current = _Trace(fmt)
     token = _CURRENT.set(current)
     try:
         results, fine = function(*(current.word(Op.INPUT, (), k) for k in range(inputs)))
@@ -312,4 +360,5 @@ def trace(function: Callable[..., tuple[tuple[Word, ...], Word | None]], inputs:
         None if fine is None else fine.place,
         inputs,
         current.names,
+        fmt,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import casadi as ca
 
@@ -28,9 +28,6 @@ _ELEMENTARY = {
     ca.OP_FLOOR: "floor",
     ca.OP_CEIL: "ceil",
     ca.OP_COPYSIGN: "copysign",
-}
-# sl_math.h has these, sl_mathf.h has not.
-_DOUBLE_ONLY = {
     ca.OP_SINH: "sinh",
     ca.OP_COSH: "cosh",
     ca.OP_TANH: "tanh",
@@ -39,12 +36,6 @@ _DOUBLE_ONLY = {
     ca.OP_ATAN: "atan",
     ca.OP_ATAN2: "atan2",
 }
-FUNCTIONS: Mapping[str, Mapping[int, str]] = {
-    "sl": {**_ELEMENTARY, **_DOUBLE_ONLY},
-    "slv": {**_ELEMENTARY, **_DOUBLE_ONLY},
-    "slf": _ELEMENTARY,
-}
-"""Functions by the prefix of their library: sl_ (double), slv_ (lanes), slf_ (float)."""
 
 MASKS = frozenset({*_COMPARISONS, *_LOGIC, ca.OP_NOT})
 """Operations whose result is a truth value; used as a number it is 1 or 0."""
@@ -134,8 +125,8 @@ def function_name(op: int, library: str, origin: str) -> str:
     origin  the Function the operation stands in, for the message
     Raises UnprintableOperation.
     """
-    if op in FUNCTIONS[library]:
-        return FUNCTIONS[library][op]
+    if op in _ELEMENTARY:
+        return _ELEMENTARY[op]
     raise UnprintableOperation(
         f"the operation {operation_name(op)} of the Function {origin!r} cannot be printed: "
         f"there is no {library}_ function for it"

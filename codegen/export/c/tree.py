@@ -6,7 +6,7 @@ from importlib import resources
 from importlib.metadata import version
 from typing import Any
 
-from springline.codegen.elementary import math_header
+from springline.codegen.elementary import float_header, math_header
 from springline.codegen.export import Export, Port, check_linked, made_with, operations
 from springline.codegen.export.c.interface import TypedInterface
 from springline.codegen.export.c.model import model_files
@@ -23,10 +23,10 @@ def generate_files(export: Export) -> tuple[dict[str, bytes], dict[str, Any]]:
     those that the model cannot compute with.
     """
     check_linked(export.prefix)
-    runtime = resources.files("springline.codegen") / "runtime"
     if export.real == "float":
-        headers = {"sl_mathf.h": (runtime / "sl_mathf.h").read_bytes()}
+        headers = {"sl_mathf.h": float_header().encode()}
     else:
+        runtime = resources.files("springline.codegen") / "runtime"
         headers = {"sl_math.h": math_header().encode(), "sl_casadi.h": (runtime / "sl_casadi.h").read_bytes()}
     model = {**model_files(export), **{f"src/{name}": content for name, content in headers.items()}}
     interface = TypedInterface(export)
