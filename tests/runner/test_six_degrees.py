@@ -234,8 +234,7 @@ ENU = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])  # along x, y to port, z up -
 @pytest.mark.parametrize(("page", "axes"), [("ned.csv", NED), ("enu.csv", ENU), ("orcaflex.csv", ENU)])
 def test_what_the_page_says_of_other_conventions(page: str, axes: np.ndarray) -> None:
     """Position and attitude of a ship told in other axes, scaled as docs/conventions.md says, are ours."""
-    blocks = [tomllib.loads(text) for text in re.findall(r"```toml\n(.*?)```", DOCS.read_text("utf-8"), re.DOTALL)]
-    (table,) = (b["base_motion"] for b in blocks if b["base_motion"].get("path") == page)
+    table = page_table(page)
     units = table.get("units", {})
     assert all(units.get(key, "rad") == ("rad" if page == "enu.csv" else "deg") for key in ("roll", "pitch", "yaw"))
     told = dict(zip(ALL, (1.0, 2.0, 3.0, 0.3, -0.4, 1.1), strict=True))
@@ -245,6 +244,114 @@ def test_what_the_page_says_of_other_conventions(page: str, axes: np.ndarray) ->
     theirs = Rotation.from_euler("ZYX", [told["yaw"], told["pitch"], told["roll"]]).as_matrix()
     rotation = Rotation.from_euler("YZX", [ours["yaw"], ours["pitch"], ours["roll"]]).as_matrix()
     np.testing.assert_allclose(rotation, axes @ theirs @ axes.T, atol=1e-15)
+
+
+def page_table(path: str) -> dict[str, Any]:
+    """[base_motion] of docs/conventions.md that reads this file."""
+    blocks = [tomllib.loads(text) for text in re.findall(r"```toml\n(.*?)```", DOCS.read_text("utf-8"), re.DOTALL)]
+    (table,) = (b["base_motion"] for b in blocks if b["base_motion"].get("path") == path)
+    return dict(table)
+
+
+class Told:
+    """A ship that moves at random, by large angles, as it is told in other axes: its record there, and what it feels.
+
+    axes   their components -> ours, 3 x 3
+    order  of their rotations, as SciPy names it;  heading: from which theirs count, rad about their vertical
+    All is made of rotation matrices and of derivatives of their columns; nothing of springline's.
+    """
+
+    def __init__(self, axes: np.ndarray, order: str = "ZYX", heading: float = 0.0) -> None:
+        random, self.t, self.axes, self.order = np.random.default_rng(7), 0.05 * np.arange(241), axes, order
+        amplitudes = np.array([3.0, 2.0, 2.5, 0.9, 0.8, 1.5])[:, None] * random.uniform(0.3, 0.5, (6, 3))
+        phases, rates = random.uniform(0, 7, (2, 6, 3)) * [[[1]], [[0.2]]] + [[[0]], [[0.2]]]
+        surge, sway, heave, roll, pitch, yaw = np.sum(
+            amplitudes[..., None] * np.sin(rates[..., None] * self.t + phases[..., None]), axis=1
+        )
+        ours = Rotation.from_euler("YZX", np.stack([yaw, pitch, roll], axis=1)).as_matrix()
+        level = Rotation.from_euler("Z", heading).as_matrix() @ axes.T
+        place = np.stack([surge, heave, sway], axis=1) @ level.T
+        angles = Rotation.from_matrix(level @ ours @ axes).as_euler(order)
+        by_axis = angles[:, [order.index(axis) for axis in "XYZ"]]
+        self.columns = np.concatenate([place, np.unwrap(by_axis, axis=0)], axis=1)
+        assert np.abs(np.stack([roll, pitch, yaw])).max(axis=1).min() > 0.4, "rad: large angles"
+
+    def write(self, path: Path, names: list[str], angle: float) -> None:
+        """angle: how many of the record's units a radian is."""
+        table = np.column_stack([self.t, self.columns * [1, 1, 1, angle, angle, angle]])
+        np.savetxt(path, table, "%.17g", ",", header=",".join(names), comments="")
+
+    def felt(self, t: np.ndarray, mount: np.ndarray, rpy: list[float]) -> np.ndarray:
+        """Specific force and angular rate at the foot in the arm's axes, (6, times); t well between two rows."""
+        spline, h = CubicSpline(self.t, self.columns), 2e-3
+        up = self.axes.T @ [0, 1, 0]
+        standing = Rotation.from_euler("YZX", rpy[::-1]).as_matrix()
+
+        def attitude(at: np.ndarray) -> Rotation:
+            columns = spline(at)[:, 3:]
+            return Rotation.from_euler(self.order, columns[:, ["XYZ".index(axis) for axis in self.order]])
+
+        def foot(at: np.ndarray) -> np.ndarray:
+            return np.asarray(spline(at)[:, :3] + attitude(at).apply(self.axes.T @ mount))
+
+        weights = ((0, -49 / 18), (1, 1.5), (2, -0.15), (3, 1 / 90))
+        acceleration = sum(w * (foot(t + k * h) + foot(t - k * h)) / (1 if k else 2) for k, w in weights) / h**2
+        turns = [(attitude(t - k * h).inv() * attitude(t + k * h)).as_rotvec() / (2 * k * h) for k in (1, 2, 3)]
+        omega = 1.5 * turns[0] - 0.6 * turns[1] + 0.1 * turns[2]
+        force = attitude(t).inv().apply(acceleration + G * up)
+        return np.concatenate([(vector @ self.axes.T @ standing).T for vector in (force, omega)])
+
+
+@pytest.mark.parametrize("mounted", [False, True])
+@pytest.mark.parametrize(("page", "axes"), [("ned.csv", NED), ("enu.csv", ENU), ("orcaflex.csv", ENU)])
+def test_one_motion_told_in_each_convention_is_felt_alike(
+    tmp_path: Path, page: str, axes: np.ndarray, mounted: bool
+) -> None:
+    """Written in each convention, read as docs/conventions.md says, six large coordinates, at times between rows."""
+    table, told = page_table(page), Told(axes)
+    names = [table["columns"][key] for key in ("t", *ALL)]
+    told.write(tmp_path / page, names, 180 / math.pi if table.get("units") else 1.0)
+    mount, rpy = (np.array([-25.0, 6.0, 4.5]), [0.3, -0.2, 2.5]) if mounted else (np.zeros(3), [0.0, 0.0, 0.0])
+    table |= {"path": str(tmp_path / page), "mount": mount.tolist(), "mount_rpy": rpy}
+    scenario = load_scenario("paper/nominal", {"base_motion": table})
+    at = told.t[10:-10:7] + 0.021
+    found, expected = readings(scenario, at), told.felt(at, mount, rpy)
+    np.testing.assert_allclose(found, expected, atol=2e-6)
+    same = readings(load_scenario("paper/nominal", {"base_motion": table | {"scale": {}}}), at)
+    assert np.abs(same - expected).max(axis=1).min() > 0.05, "the scale counts in each of the six"
+
+
+def test_another_order_of_rotations_is_written_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As a buoy's in OrcaFlex, and about another heading: no scale makes it right, the page's lines do."""
+    told, table, ours = Told(ENU, "XYZ", heading=0.7), page_table("orcaflex.csv"), Told(ENU)
+    names = [table["columns"][key] for key in ("t", *ALL)]
+    told.write(tmp_path / "orcaflex.csv", names, 180 / math.pi)
+    (script,) = re.findall(r"```python\n(.*?)```", DOCS.read_text("utf-8"), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(script, str(DOCS), "exec"), {})  # noqa: S102
+    at = told.t[10:-10:7] + 0.021
+
+    def felt(file: str) -> np.ndarray:
+        changed = table | {"path": str(tmp_path / file)}
+        return readings(load_scenario("paper/nominal", {"base_motion": changed}), at)
+
+    # The rows are the same; between them either record has splines through its own angles.
+    expected = ours.felt(at, np.zeros(3), [0.0, 0.0, 0.0])
+    assert np.abs(felt("turned.csv") - expected).max() < 2e-6
+    assert np.abs(felt("orcaflex.csv") - expected).max() > 1.0
+
+    said = re.findall(r"^\| (\d+)° \| ([\d.]+)° \| ([\d.]+) m/s² \|$", DOCS.read_text("utf-8"), re.MULTILINE)
+    assert len(said) == 4
+    for angle, off, force in said:
+        angles = [float(angle)] * 3
+        buoy, vessel = (Rotation.from_euler(order, angles, degrees=True) for order in ("XYZ", "ZYX"))
+        attitude = math.degrees((buoy.inv() * vessel).magnitude())
+        rest = np.linalg.norm(buoy.inv().apply([0, 0, G]) - vessel.inv().apply([0, 0, G]))
+        with capsys.disabled():
+            print(f"\nthree angles of {angle} deg in the other order: {attitude:.3g} deg, {rest:.3g} m/s^2 at rest")
+        assert (f"{attitude:.{len(off.partition('.')[2])}f}", f"{rest:.{len(force.partition('.')[2])}f}") == (off, force)
 
 
 def test_the_picture_says_what_the_model_does() -> None:
