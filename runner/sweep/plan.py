@@ -33,6 +33,7 @@ from springline.runner.scenario import (
     names_file,
     portable_text,
     records,
+    weighs,
 )
 from springline.runner.scenario import FOLDER as TABLES
 from springline.runner.sweep import sampling
@@ -60,6 +61,7 @@ _LARGEST_CHUNK = 2048
 _CHUNKS = 32
 _FEWEST_CHUNKS = 8
 _TRAJECTORY_BYTES = 64e6
+_DRAWN_AT_ONCE = 8192
 _MOST_STEPS_IN_ALL = 2**63 - 1  # the counter of the loop's progress
 
 
@@ -179,6 +181,24 @@ class Plan:
             for joint in group.work.system.joints:
                 found.setdefault(joint.name, joint)
         return tuple(found.values())
+
+    def expect_plausible(self) -> None:
+        """Raise InputError for the first run with masses and inertias that no arm has; before one is started, that is.
+
+        Making a Plan does not tell, for it draws no run, and who replays one needs to know nothing of the others.
+        """
+        axes = [axis for axis in self.sweep.axes if axis.key in self._numeric and weighs(axis.key)]
+        for group in self.groups if axes else ():
+            for first in range(0, group.runs, _DRAWN_AT_ONCE):
+                runs = min(_DRAWN_AT_ONCE, group.runs - first)
+                columns = self.columns(Chunk(-1, group, group.first + first, runs))
+                found = group.scenario.implausible_run({k: v for k, v in columns.items() if k in self._numeric})
+                if found is None:
+                    continue
+                run, text = found
+                key = f"vary.{axes[0].key}" if len(axes) == 1 else "vary"
+                remedy = "leave such values out of what varies, or bounds in the class refuse them by name"
+                raise InputError(Problem(self.sweep.source, key, f"run {group.first + first + run}: {text} ({remedy})"))
 
     # Numbers
 
