@@ -546,6 +546,18 @@ def test_a_motion_that_is_none_is_told(circle: Path, old: str, new: str, told: l
     assert all(part in message for part in told), message
 
 
+def test_a_motion_that_jumps_is_warned_of(circle: Path) -> None:
+    """By every command; it runs all the same."""
+    assert not load_scenario(circle).notes
+    (circle.parent / "circle.py").write_text(MOTION.replace("0, p.heel", "0.1 * ca.fabs(t - 0.01), ca.sign(t - 0.015)"))
+    heave, roll = load_scenario(circle).notes
+    assert "/circle.py:Circle: the rate of heave jumps by 0.2 m/s at 0.01 s: the arm feels" in heave
+    assert "base_motion.kind: " in roll and "roll jumps by 2 rad at 0.015 s: " in roll and "tanh" in roll
+    done = springline("run", circle, "-o", circle.parent / "out", "--no-plot")
+    assert done.exit_code == 0 and "the rate of heave jumps" in done.stderr
+    assert not load_scenario(circle, {"simulation.duration": 0.005}).notes
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
