@@ -1,4 +1,4 @@
-"""Where a base motion of a user's own jumps, in position or in rate, and so has no accelerations for the arm to feel."""
+"""Where a base motion of a user's own jumps, in position or in rate, and has no accelerations for the arm to feel."""
 
 from __future__ import annotations
 

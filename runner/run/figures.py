@@ -44,8 +44,9 @@ _MOVES = 1e-12  # a base coordinate that stays below this stands still
 
 def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
     """The overview of one run, by name: tracking, error, force; sliding if there is a sliding variable, springs if
-    there are springs, base_motion if the base moves, disturbance of the links on which forces act, tip if the arm has one. If
-    the run came to its end also steady_state, and error_over_base and error_against_base if the base follows a record.
+    there are springs, base_motion if the base moves, disturbance of the links on which forces act, tip if the arm has
+    one. If the run came to its end also steady_state, and error_over_base and error_against_base if the base follows a
+    record.
     """
     run = _Run(scenario, result)
     figures: dict[str, Callable[[_Run], Figure]] = {

@@ -364,9 +364,10 @@ def _corner_notes(motion: str, table: Mapping[str, Any], duration: float) -> lis
             what, unit = f"the rate of {corner.key}", f"{unit}/s"
         more = f" (and at {corner.count - 1} more times)" if corner.count > 1 else ""
         notes.append(
-            f"base_motion.kind: {table['kind']}: {what} jumps by {corner.size:.3g} {unit} at {corner.t:.6g} s{more}: the "
-            "arm feels accelerations, which follow by differentiation and have nothing of a jump, so that it feels "
-            "another motion than the one that is shown (let one value pass into the other smoothly, by a tanh or a quintic)"
+            f"base_motion.kind: {table['kind']}: {what} jumps by {corner.size:.3g} {unit} at {corner.t:.6g} s{more}: "
+            "the arm feels accelerations, which follow by differentiation and have nothing of a jump, so that it feels "
+            "another motion than the one that is shown (let one value pass into the other smoothly, by a tanh or a "
+            "quintic)"
         )
     return notes
 

@@ -384,7 +384,7 @@ class Scenario:
             raise InputError(Problem(where, key, f"{owner}{error}")) from error
 
     def implausible_run(self, columns: Mapping[str, Floats]) -> tuple[int, str] | None:
-        """The first run with masses and inertias that no arm has at the start, and what is wrong; None if there is none.
+        """The first run with masses and inertias that no arm has at the start, and what is wrong; None if none has.
 
         columns  as for `slots_for`, which raises InputError for them
         """

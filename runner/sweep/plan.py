@@ -38,7 +38,7 @@ from springline.runner.scenario import (
 from springline.runner.scenario import FOLDER as TABLES
 from springline.runner.sweep import sampling
 from springline.runner.sweep.axis_checks import AxisChecks
-from springline.runner.sweep.drawing import Columns, Drawing
+from springline.runner.sweep.drawing import Columns, Drawing, grid_values
 from springline.runner.sweep.sweep import Axis, Sweep
 from springline.runner.sweep.work import Outcome, Work, work_for
 
@@ -111,6 +111,7 @@ class Plan:
         self.sweep = sweep
         self.runs = sweep.samples * math.prod(len(axis.values) for axis in sweep.axes if axis.kind == "each")
         grouping = {axis.key for axis in sweep.axes if _switches(axis.key, axis.reach(sweep.axes))}
+        grouping |= {axis.key for axis in sweep.axes if _takes_out_a_mount(axis, sweep)}
         self._numeric = {k: v for k, v in sweep.scenario.numeric_keys().items() if k not in grouping}
         self._free = [axis for axis in sweep.axes if axis.kind != "tie"]
         self._outer = [axis for axis in self._free if self._groups_runs(axis)]
@@ -446,6 +447,31 @@ class Plan:
 def _switches(key: str, numbers: tuple[float, ...]) -> bool:
     """Whether a key takes something out of the structure in some runs and not in others."""
     return absent_at_zero(key) and 0.0 in numbers and any(numbers)
+
+
+def _takes_out_a_mount(axis: Axis, sweep: Sweep) -> bool:
+    """Whether a key makes the arm stand as the base does in some runs and not in others: there is no mount in the first.
+
+    That is so where all of `mount`, or of `mount_rpy`, is exactly zero. Equations without it round otherwise, so a
+    run by itself, which has none, would not have the bits of one that shares a kernel with others.
+    """
+    table, _, rest = axis.key.partition(".")
+    name, _, place = rest.partition(".")
+    given = sweep.scenario.document["base_motion"].get(name)
+    if table != "base_motion" or name not in ("mount", "mount_rpy") or not place.isdecimal() or given is None:
+        return False
+    reached = {other.key: _taken(other, sweep) for other in sweep.axes}
+    own = reached[axis.key]
+    others = [reached.get(f"base_motion.{name}.{k}", (value,)) for k, value in enumerate(given) if str(k) != place]
+    return 0.0 in own and any(own) and all(0.0 in numbers for numbers in others)
+
+
+def _taken(axis: Axis, sweep: Sweep) -> tuple[float, ...]:
+    """Numbers that an axis takes, as far as they are zero or not: in a grid, also those of a range."""
+    source = next((other for other in sweep.axes if other.key == axis.tie), axis)
+    if source.points and not axis.values:
+        return tuple(float(value) for value in axis.factor * grid_values(source))
+    return axis.reach(sweep.axes)
 
 
 def _tied_value(axis: Axis, value: Any, place: int) -> Any:

@@ -24,6 +24,7 @@ from springline.runner.cli import app
 from springline.runner.files import InputError
 from springline.runner.report import conventions
 from springline.runner.scenario import Scenario
+from springline.runner.sweep import Plan, load_sweep
 
 DATA = resources.files("springline.runner") / "scenarios" / "data"
 G = 9.80665
@@ -68,14 +69,22 @@ def test_the_vessel_feels_what_its_measuring_unit_recorded(capsys: pytest.Captur
         print("\nrms of the difference, of the standard deviation:", ", ".join(shown))
     assert np.all(rms[:3] < 1e-3), "m/s^2"
     assert np.all(rms[3:] < 1e-6), "rad/s"
-    assert np.all(rms / spread < [0.003, 0.006, 0.003, 1e-4, 1e-3, 1e-4])
+    force, rate = (rms / spread)[:3], (rms / spread)[3:]
+    page = " ".join(DOCS.read_text("utf-8").split())
+    said = re.search(
+        r"to ([\d.]+) % \(x\), ([\d.]+) % \(y\) and ([\d.]+) % \(z\) .*? rate to ([\d.]+) % and better", page
+    )
+    assert said and [f"{100 * value:.1f}" for value in force] == list(said.groups()[:3])
+    assert np.all(100 * rate < float(said[4])) and 100 * rate.max() > 0.9 * float(said[4])
 
 
 def test_three_degrees_of_freedom_have_the_vertical_alone() -> None:
-    """What the paper's base would make of the same record: 1.3 % of the vertical, 55 % of the longitudinal."""
+    """What the paper's base would make of the same record: the vertical, and little else."""
     three = {"base_motion.columns": THREE, "base_motion.units": {}, "base_motion.scale": {}}
     rms, spread = misfits(load_scenario("ship/vessel_10hz", LONG | three))
-    assert (rms / spread)[:2] == pytest.approx([0.55, 0.013], rel=0.05)
+    along, up = (rms / spread)[:2]
+    page = " ".join(DOCS.read_text("utf-8").split())
+    assert f"the vertical is right to {100 * up:.1f} %, and x is off by {100 * along:.0f} %" in page
     assert (rms / spread)[2] > 0.3
 
 
@@ -351,7 +360,8 @@ def test_another_order_of_rotations_is_written_anew(
         rest = np.linalg.norm(buoy.inv().apply([0, 0, G]) - vessel.inv().apply([0, 0, G]))
         with capsys.disabled():
             print(f"\nthree angles of {angle} deg in the other order: {attitude:.3g} deg, {rest:.3g} m/s^2 at rest")
-        assert (f"{attitude:.{len(off.partition('.')[2])}f}", f"{rest:.{len(force.partition('.')[2])}f}") == (off, force)
+        digits = [len(text.partition(".")[2]) for text in (off, force)]
+        assert [f"{attitude:.{digits[0]}f}", f"{rest:.{digits[1]}f}"] == [off, force]
 
 
 def test_the_picture_says_what_the_model_does() -> None:
@@ -616,6 +626,50 @@ def test_a_sweep_over_it_can_be_replayed(circle: Path, tmp_path: Path, monkeypat
     for run in (0, 1, 3):
         done = springline("replay", "data", run, "--no-plot", "-o", f"run{run}", "--code", "circle.py")
         assert done.exit_code == 0 and "bit for bit" in done.output, done.output
+
+
+@pytest.mark.parametrize(
+    ("vary", "groups"),
+    [
+        ("base_motion.mount_rpy.0 = { values = [0.0, 0.1, -0.2] }", 3),
+        ("base_motion.mount_rpy.0 = { values = [0.1, 0.3] }", 1),
+        ("base_motion.mount_rpy.0 = { values = [0.0, 0.1] }\nbase_motion.mount_rpy.2 = { values = [0.0, 0.5] }", 4),
+        ("base_motion.mount_rpy.0 = { values = [0.0, 0.1] }\nbase_motion.mount_rpy.2 = { values = [0.2, 0.5] }", 1),
+        ("base_motion.mount_rpy.1 = { values = [0.0, 0.5] }", 1),
+        ("base_motion.mount.0 = { values = [0.0, 2.0] }\nbase_motion.mount_rpy.0 = { values = [0.0, 0.1] }", 4),
+        ("base_motion.mount_rpy.0 = { uniform = [0.05, 0.2], points = 3 }", 1),
+    ],
+)
+def test_an_arm_that_stands_as_its_base_does_among_others_that_do_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, vary: str, groups: int
+) -> None:
+    """Equations without a mount round otherwise: such runs have a kernel of their own, and every one is replayed."""
+    monkeypatch.chdir(tmp_path)
+    Path("s.toml").write_text(base(f"{SIX}\nmount = [2.0, 0.0, 0.0]\nmount_rpy = [0.1, 0.0, 0.0]"))
+    Path("w.toml").write_text(f'scenario = "s.toml"\nmethod = "grid"\n[vary]\n{vary}\n')
+    plan = Plan(load_sweep(Path("w.toml")))
+    assert len(plan.groups) == groups
+    for group in plan.groups:
+        for run in range(group.first, group.first + group.runs):
+            assert plan.scenario_of(run).structure() == group.work.spec.structure
+
+
+def test_a_run_without_a_mount_is_replayed_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("s.toml").write_text(base(f"{SIX}\nmount_rpy = [0.1, 0.0, 0.0]").replace("0.02", "0.3"))
+    vary = "base_motion.mount_rpy.0 = { values = [0.0, 0.1] }\ncontrol.delta = { values = [0.04, 0.05] }"
+    Path("w.toml").write_text(f'scenario = "s.toml"\nmethod = "grid"\n[vary]\n{vary}\n')
+    assert springline("batch", "w.toml", "-o", "data", "--no-plot", "--jobs", 1).exit_code == 0
+    for run in range(4):
+        done = springline("replay", "data", run, "--no-plot", "-o", f"run{run}")
+        assert done.exit_code == 0 and "bit for bit" in done.output, done.output
+    for points in ("[0.0, 0.2], points = 3", "[-0.1, 0.1], points = 5"):
+        Path("w.toml").write_text(
+            f'scenario = "s.toml"\nmethod = "grid"\n[vary]\nbase_motion.mount_rpy.0 = {{ uniform = {points} }}\n'
+        )
+        refused = springline("batch", "w.toml", "-o", "other", "--dry-run")
+        assert refused.exit_code == 2 and "vary.base_motion.mount_rpy.0: " in refused.stderr, refused.output
+        assert "{ values = [...] }" in refused.stderr
 
 
 def test_commands_take_it_and_refuse_it_without_code(circle: Path, tmp_path: Path) -> None:

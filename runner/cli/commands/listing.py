@@ -49,14 +49,15 @@ def list_(
         raise InputError(Problem(scenario, "", f"only goes with springline list parameters, not with {what.value}"))
     if changes and not scenario:
         raise InputError(Problem("", "", "--set goes with a scenario: springline list parameters SCENARIO --set ..."))
-    rows = _own_rows(scenario, changes) if scenario else {
+    listed = {
         "mechanisms": mechanisms,
         "controllers": controllers,
         "laws": laws,
         "parameters": parameters,
         "scenarios": scenarios,
         "sweeps": sweeps,
-    }[what.value]()
+    }
+    rows = _own_rows(scenario, changes) if scenario else listed[what.value]()
     if as_json:
         print_json("list", rows, {})
         return

@@ -72,7 +72,7 @@ def test_forces_on_the_links_are_seen_against_none() -> None:
     (axes,) = run_figures(*steady)["disturbance"].axes
     assert axes.get_ylabel() == "lift\ndisturbance $F_d$ [N]"
     low, high = axes.get_ylim()
-    assert low < 0.0 < 1500.0 < high
+    assert low < 0.0 and high > 1500.0
     assert [line.get_label() for line in axes.lines] == ["no force", "force, positive along +q₁"]
     both = {"lift": {"offset": 0.0, "terms": [{"amplitude": 9.0, "omega": 8.0}]}, "rotation": {"offset": -3.0}}
     run = simulated("paper/nominal", **quiet, **{f"disturbance__{joint}": table for joint, table in both.items()})

@@ -194,6 +194,11 @@ def test_jittering_rows_give_a_band_limited_signal_back(
     dense = np.linspace(t[0], t[-1], 1001)
     allowed = sum(a * (omega * longest) ** 4 for a, omega, _ in sines) / 30
     assert np.abs(evaluate(table, dense) - signal(dense)).max() <= allowed + 1e-12
+    curved = sum((-a * omega**2 * np.sin(omega * dense + phase) for a, omega, phase in sines), np.zeros_like(dense))
+    off = np.abs(evaluate(table, dense, 2) - curved)
+    share = sum(a * omega**2 * (omega * longest) ** 2 for a, omega, _ in sines)
+    inner = (dense >= t[6]) & (dense <= t[-7])
+    assert off[inner].max() <= 0.1 * share and off.max() <= 0.6 * share
 
 
 @given(st.floats(0.001, 0.3), st.booleans(), SEEDS)
