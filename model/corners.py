@@ -57,7 +57,8 @@ def corners(motion: BaseMotion, given: Mapping[str, float], duration: float) -> 
         return []
     p = np.array([given[item.name] for item in motion.parameters])
     switching = ca.Function("switches", [t, vector.sx], [ca.vertcat(*switches)])
-    sought = [(key, of) for key in moving for of in ("position", "rate")]
+    kinds: tuple[Literal["position", "rate"], ...] = ("position", "rate")
+    sought = [(key, of) for key in moving for of in kinds]
     written = [item for signal in moving.values() for item in (signal.value, signal.rate)]
     values = ca.Function("values", [t, vector.sx], [ca.densify(ca.vertcat(*written))])
 

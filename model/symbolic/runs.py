@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +24,15 @@ def over_runs(function: ca.Function, *inputs: Floats) -> list[Floats]:
     rows = [np.ascontiguousarray(given.T) for given in inputs]
     taken = [row[0].copy() for row in rows]
     given = [np.empty(function.nnz_out(i)) for i in range(function.n_out())]
-    buffer, evaluate = function.buffer()
+    # What CasADi's stub says of its buffers is not what they take.
+    bound: tuple[Any, Callable[[], None]] = function.buffer()
+    buffer, evaluate = bound
     for i, numbers in enumerate(taken):
         if numbers.size:
-            buffer.set_arg(i, memoryview(numbers))
+            buffer.set_arg(i, numbers.data)
     for i, numbers in enumerate(given):
-        buffer.set_res(i, memoryview(numbers))
+        if numbers.size:
+            buffer.set_res(i, numbers.data)
     found = [np.empty((count, len(numbers))) for numbers in given]
     for k in range(count):
         for numbers, row in zip(taken, rows, strict=True):

@@ -392,7 +392,10 @@ class Scenario:
             return None
         slots, runs = self.slots_for(columns), len(next(iter(columns.values())))
         for first in range(0, runs, _RUNS_AT_ONCE):
-            block = {key: v[first : first + _RUNS_AT_ONCE] if np.ndim(v) else v for key, v in slots.items()}
+            block: Slots = {
+                key: value if isinstance(value, float) else value[first : first + _RUNS_AT_ONCE]
+                for key, value in slots.items()
+            }
             values = per_run(block, list(block), min(_RUNS_AT_ONCE, runs - first)).T
             try:
                 self.system().expect_plausible(self._start_positions(values), values)

@@ -164,7 +164,7 @@ def _rows(data: bytes, file: str, where: str, key: str) -> Iterator[tuple[int, l
 def _header(
     rows: list[tuple[int, list[str]]], data: bytes, file: str, columns: Sequence[Column], where: str, key: str
 ) -> list[str]:
-    """The names of a file's columns, from its first rows. Raises InputError where some that are asked for are missing."""
+    """The names of a file's columns, from its first rows. Raises InputError where one that is asked for is none."""
     if not rows:
         raise InputError(Problem(where, key, f"{file} is empty: expected a header that names its columns"))
     line, header = rows[0][0], list(map(str.strip, rows[0][1]))

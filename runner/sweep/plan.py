@@ -450,7 +450,7 @@ def _switches(key: str, numbers: tuple[float, ...]) -> bool:
 
 
 def _takes_out_a_mount(axis: Axis, sweep: Sweep) -> bool:
-    """Whether a key makes the arm stand as the base does in some runs and not in others: there is no mount in the first.
+    """Whether a key makes the arm stand as the base does in some runs and not in others: the first have no mount.
 
     That is so where all of `mount`, or of `mount_rpy`, is exactly zero. Equations without it round otherwise, so a
     run by itself, which has none, would not have the bits of one that shares a kernel with others.
