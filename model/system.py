@@ -16,6 +16,7 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from springline.model import perturbation, signals
 from springline.model.base import MOUNT, MOUNT_RPY, BaseState
@@ -47,7 +48,7 @@ from springline.model.drive import (
 from springline.model.dynamics import EquationsOfMotion, equations_of_motion
 from springline.model.hardware import actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
-from springline.model.mechanisms import MECHANISMS, Mechanism, expect_plausible
+from springline.model.mechanisms import MECHANISMS, BodyCheck, Implausible, Mechanism
 from springline.model.metrics import METRICS
 from springline.model.parameters import REAL, Joint, Parameter, ParameterVector, Slot, Values
 from springline.model.quantities import (
@@ -75,9 +76,12 @@ from springline.model.quantities import (
 )
 from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
-from springline.model.symbolic import as_written, associated, derivation, derived_property, without
+from springline.model.symbolic import as_written, associated, derivation, derived_property, over_runs, without
 from springline.model.terms import Term, noted
 from springline.model.tip import tip_motion
+
+# Relative to the largest eigenvalue: a mass matrix below this is singular to the precision of what is computed with it.
+_SINGULAR = 1e-12
 
 
 def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tuple[Parameter, ...]:
@@ -342,14 +346,41 @@ class System:
         """The arm that moves: its equations of motion, with the plant's parameters."""
         return equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._plant)
 
-    @derivation
-    def expect_plausible(self, q: Sequence[float], values: np.ndarray) -> None:
-        """Raise ValueError for masses and inertias that no body has, of the plant or of the controller's arm.
+    @derived_property
+    def _body_checks(self) -> tuple[BodyCheck, ...]:
+        """Of the controller's arm and of the plant."""
+        return tuple(BodyCheck(self.mechanism, p, self.p) for p in (self._nominal, self._plant))
 
-        q  joint coordinates, n;  values: the parameter vector p
+    def start_positions(self, row: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Joint coordinates at the start, n x runs: those that are given, or the reference's.
+
+        row  what the signal tables have at time 0;  values: the parameter vector p, slots x runs
         """
-        for p in (self._nominal, self._plant):
-            expect_plausible(self.mechanism, p, self.p, q, values)
+        if self.structure.start == "given":
+            return values[[k for k, slot in enumerate(self.slots) if slot.key.startswith("initial.q.")]]
+        at, rows = np.zeros((1, values.shape[1])), np.tile(row[:, None], values.shape[1])
+        (found,) = over_runs(self.function("signals"), at, rows, values)
+        return found[:, : self.n, 0].T
+
+    def expect_plausible(self, q: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+        """Raise Implausible for what no arm has, in the plant or in what the controller believes of it.
+
+        That is a mass or an inertia that no body has, and a mass matrix of the plant that is not positive definite.
+        q  joint coordinates, n x runs;  values: the parameter vector p, slots x runs
+        """
+        for check in self._body_checks:
+            check.expect_plausible(q, values)
+        (mass,) = over_runs(self.function("mass_matrix"), q, values)
+        finite = np.isfinite(mass).all(axis=(1, 2))
+        sizes = np.full((len(mass), self.n), np.nan)
+        sizes[finite] = np.linalg.eigvalsh(mass[finite])
+        bad = ~(sizes[:, 0] > _SINGULAR * sizes[:, -1])
+        if bad.any():
+            k = int(bad.argmax())
+            at = ", ".join(f"{joint.name} = {value:.6g}" for joint, value in zip(self.joints, q[:, k], strict=True))
+            least = f"is not positive definite, its least eigenvalue is {sizes[k, 0]:.3g}"
+            remedy = "expected every joint to move a mass or an inertia (or start elsewhere, initial.q)"
+            raise Implausible(f"the mass matrix at the start ({at}) {least}: {remedy}", k)
 
     def terms(self, name: str) -> tuple[Term, ...]:
         """What the model calls the parts of Function `name`; they are the outputs of Function `name`_terms."""

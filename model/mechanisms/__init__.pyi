@@ -7,5 +7,6 @@ from .link import aligned as aligned
 from .link import outwards as outwards
 from .mechanism import TAKEN as TAKEN
 from .mechanism import Mechanism as Mechanism
-from .plausible import expect_plausible as expect_plausible
+from .plausible import BodyCheck as BodyCheck
+from .plausible import Implausible as Implausible
 from .registry import MECHANISMS as MECHANISMS

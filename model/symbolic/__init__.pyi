@@ -7,4 +7,5 @@ from .linear import over as over
 from .linear import solve_spd as solve_spd
 from .normal_form import TooManyTerms as TooManyTerms
 from .normal_form import collect as collect
+from .runs import over_runs as over_runs
 from .zeros import without as without

@@ -44,8 +44,9 @@ _MOVES = 1e-12  # a base coordinate that stays below this stands still
 
 def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
     """The overview of one run, by name: tracking, error, force; sliding if there is a sliding variable, springs if
-    there are springs, base_motion if the base moves, disturbance if forces act on the links, tip if the arm has one. If
-    the run came to its end also steady_state, and error_over_base and error_against_base if the base follows a record.
+    there are springs, base_motion if the base moves, disturbance of the links on which forces act, tip if the arm has
+    one. If the run came to its end also steady_state, and error_over_base and error_against_base if the base follows a
+    record.
     """
     run = _Run(scenario, result)
     figures: dict[str, Callable[[_Run], Figure]] = {
@@ -60,8 +61,8 @@ def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
         figures["springs"] = _lines("spring", Q2, less=Q1)
     if run.moving:
         figures["base_motion"] = _base_motion
-    if DISTURBANCE in shown:
-        figures["disturbance"] = _lines("disturbance", DISTURBANCE)
+    if run.pushed:
+        figures["disturbance"] = _disturbance
     if TIP[0] in shown:
         figures["tip"] = _tip
     if run.status == "ok":
@@ -90,6 +91,11 @@ class _Run:
             c for c in scenario.structure().base_coordinates if np.max(np.abs(self[c.symbol])) > _MOVES
         )
 
+        columns = set(result.trajectory.column_names)
+        self.pushed: tuple[Joint, ...] = tuple(
+            j for j in self.joints if (name := f"{DISTURBANCE.name}_{j.name}") in columns and self[name].any()
+        )
+
     def __getitem__(self, column: str) -> Floats:
         values: Floats = self._table[column].to_numpy()
         return values
@@ -114,12 +120,16 @@ class _Run:
         return self._units[column]
 
 
-def _joint_panels(run: _Run, text: str, quantity: Quantity) -> tuple[Figure, list[tuple[Axes, Joint]]]:
-    """One panel a joint over time, labelled with the joint, the text and the unit of the quantity."""
-    figure, grid = panels(len(run.joints))
-    pairs = list(zip(grid[:, 0], run.joints, strict=True))
+def _joint_panels(
+    run: _Run, text: str, quantity: Quantity, joints: tuple[Joint, ...] = ()
+) -> tuple[Figure, list[tuple[Axes, Joint]]]:
+    """One panel a joint (of `joints`, or of all) over time, labelled with it, the text and the quantity's unit."""
+    joints = joints or run.joints
+    figure, grid = panels(len(joints))
+    pairs = list(zip(grid[:, 0], joints, strict=True))
     for axes, joint in pairs:
         axes.set_ylabel(label(f"{joint.name}\n{text}", run.unit(f"{quantity.name}_{joint.name}")))
+    figure.align_ylabels()
     _time_axis(run, figure)
     return figure, pairs
 
@@ -197,6 +207,16 @@ def _lines(word: str, quantity: Quantity, less: Quantity | None = None) -> Calla
         return figure
 
     return make
+
+
+def _disturbance(run: _Run) -> Figure:
+    """The forces on the links that any acts on. Zero is in sight, for a force is told by its size and its sign."""
+    figure, pairs = _joint_panels(run, f"disturbance {symbol(DISTURBANCE)}", DISTURBANCE, run.pushed)
+    for axes, joint in pairs:
+        axes.axhline(0.0, label="no force", **REFERENCE)
+        draw(axes, run.t, run[f"{DISTURBANCE.name}_{joint.name}"], "force, positive along +q₁", **LINES[0])
+    legend_above(figure)
+    return figure
 
 
 def _base_motion(run: _Run) -> Figure:

@@ -14,6 +14,7 @@ from .scenario import draft_scenario as draft_scenario
 from .scenario import expect_scenario as expect_scenario
 from .scenario import load_scenario as load_scenario
 from .scenario import per_run as per_run
+from .scenario import weighs as weighs
 from .schema import DOORS as DOORS
 from .schema import DOOR_KEYS as DOOR_KEYS
 from .schema import given_text as given_text

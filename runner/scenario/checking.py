@@ -13,6 +13,8 @@ import numpy as np
 
 from springline.codegen.kernel import MOST_STEPS
 from springline.model.base import ALIASES, COORDINATES
+from springline.model.base_motion import MOTIONS
+from springline.model.corners import corners
 from springline.model.drive import DRIVES, DriveKind
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE
@@ -113,6 +115,8 @@ def resolve(
             problems += error.problems
     if problems:
         raise InputError(*(replace(problem, key=respelled(problem.key, given_names)) for problem in problems))
+    if motion and read:
+        notes += _corner_notes(motion, document["base_motion"], document["simulation"]["duration"])
     return document, tuple(tables), tuple(notes), code
 
 
@@ -348,6 +352,24 @@ def _load_table(table: Mapping[str, Any], name: str, time: Column, channels: Seq
     ends = cast(Ends, table["ends"])
     max_gap = table.get("max_gap")
     return read_table(data, path, time, channels, ends, t0=table["t0"], max_gap=max_gap, where=where, key=key)
+
+
+def _corner_notes(motion: str, table: Mapping[str, Any], duration: float) -> list[str]:
+    """A warning for each coordinate that a user's motion lets jump."""
+    units = {c.key: c.unit for c in COORDINATES}
+    notes = []
+    for corner in corners(MOTIONS[motion], table, duration):
+        what, unit = corner.key, units[corner.key]
+        if corner.of == "rate":
+            what, unit = f"the rate of {corner.key}", f"{unit}/s"
+        more = f" (and at {corner.count - 1} more times)" if corner.count > 1 else ""
+        notes.append(
+            f"base_motion.kind: {table['kind']}: {what} jumps by {corner.size:.3g} {unit} at {corner.t:.6g} s{more}: "
+            "the arm feels accelerations, which follow by differentiation and have nothing of a jump, so that it feels "
+            "another motion than the one that is shown (let one value pass into the other smoothly, by a tanh or a "
+            "quintic)"
+        )
+    return notes
 
 
 def _acceleration_notes(

@@ -21,7 +21,7 @@ from springline.model.base import COORDINATES, shortest
 from springline.model.base_motion import MOTIONS, moving_terms
 from springline.model.control import CONTROLLERS, LAWS, LogForm, SurfaceExponents
 from springline.model.drive import DRIVES, FRICTION, DriveKind
-from springline.model.mechanisms import MECHANISMS
+from springline.model.mechanisms import MECHANISMS, Implausible
 from springline.model.structure import MotorStart, SignalKind, SignalShape, Structure
 from springline.model.system import System, system_of
 from springline.runner.files import InputError, Problem, document_text, read_toml, shortened, unknown
@@ -43,8 +43,8 @@ from springline.runner.scenario.splines import Spline
 from springline.runner.scenario.user_code import UserClass, canonical_reference, load_class, read_class, told
 
 Floats = NDArray[np.float64]
-# Relative to the largest eigenvalue: a mass matrix below this is singular to the precision of what is computed with it.
-_SINGULAR = 1e-12
+_ARM = ("mechanism", "drive", "plant", "initial", "reference")
+_RUNS_AT_ONCE = 4096
 
 Slots = dict[str, float | Floats]
 """Slot key -> one number for all runs, or a column (runs,) of them."""
@@ -377,27 +377,38 @@ class Scenario:
 
     def _expect_bodies(self, where: str, key: str, owner: str) -> None:
         """Raise InputError for masses and inertias that no arm has at the start."""
-        values = self.values()
-        q = self._start_position(values)
+        values = self.values()[:, None]
         try:
-            self.system().expect_plausible(q, values)
+            self.system().expect_plausible(self._start_positions(values), values)
         except ValueError as error:
             raise InputError(Problem(where, key, f"{owner}{error}")) from error
-        mass = np.array(self.system().function("mass_matrix")(q, values))
-        sizes = np.linalg.eigvalsh(mass) if np.isfinite(mass).all() else np.array([np.nan])
-        if not sizes[0] > _SINGULAR * sizes[-1]:
-            at = ", ".join(f"{joint.name} = {value:.6g}" for joint, value in zip(self.system().joints, q, strict=True))
-            least = f"is not positive definite, its least eigenvalue is {sizes[0]:.3g}"
-            remedy = "expected every joint to move a mass or an inertia (or start elsewhere, initial.q)"
-            raise InputError(Problem(where, key, f"{owner}the mass matrix at the start ({at}) {least}: {remedy}"))
 
-    def _start_position(self, values: Floats) -> list[float]:
-        """Joint coordinates at the start, n: those that are given, or the reference's."""
-        if self.structure().start == "given":
-            return [float(value) for value in self.document["initial"]["q"]]
+    def implausible_run(self, columns: Mapping[str, Floats]) -> tuple[int, str] | None:
+        """The first run with masses and inertias that no arm has at the start, and what is wrong; None if none has.
+
+        columns  as for `slots_for`, which raises InputError for them
+        """
+        if MECHANISMS[self.structure().mechanism].regular or not any(map(weighs, columns)):
+            return None
+        slots, runs = self.slots_for(columns), len(next(iter(columns.values())))
+        for first in range(0, runs, _RUNS_AT_ONCE):
+            block: Slots = {
+                key: value if isinstance(value, float) else value[first : first + _RUNS_AT_ONCE]
+                for key, value in slots.items()
+            }
+            values = per_run(block, list(block), min(_RUNS_AT_ONCE, runs - first)).T
+            try:
+                self.system().expect_plausible(self._start_positions(values), values)
+            except Implausible as error:
+                run = first + error.run
+                given = ", ".join(f"{key} = {column[run]:.6g}" for key, column in columns.items() if weighs(key))
+                return run, f"{given}: {error}"
+        return None
+
+    def _start_positions(self, values: Floats) -> Floats:
+        """Joint coordinates at the start, n x runs, for values of p, slots x runs."""
         row = np.concatenate([np.zeros(0), *(table.row(0.0) for table in self.tables())])
-        signals = np.array(self.system().function("signals")(0.0, row, values)).ravel()
-        return [float(value) for value in signals[: len(self.system().joints)]]
+        return self.system().start_positions(row, values)
 
     def _canonical(self, overrides: Mapping[str, object], where: str) -> dict[str, object]:
         """Overrides with keys and users' classes named as the document does, so that the same is known for the same.
@@ -608,6 +619,11 @@ def _give_plant_its_own(document: Document, key: str, joints: int) -> None:
     nominal = next((document[table][name] for table in ("mechanism", "drive") if name in document[table]), None)
     if isinstance(nominal, list):
         document["plant"].setdefault(name, {"scale": [1.0] * joints} if rest[0] == "scale" else nominal)
+
+
+def weighs(key: str) -> bool:
+    """Whether the masses and inertias of an arm at its start may depend on a dotted key."""
+    return key.partition(".")[0] in _ARM
 
 
 def absent_at_zero(key: str) -> bool:

@@ -12,8 +12,9 @@ import io
 import math
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,11 +47,13 @@ _SPELLED = {
 # likely a damaged cell than a number.
 _NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?\s*", re.ASCII)
+_OTHER = re.compile(r"[^0-9+.eE\s-]", re.ASCII)
 _WHOLE = re.compile(r"\s*[+-]?[0-9]+([eE][+-]?[0-9]+)?\s*", re.ASCII)
 _SEPARATORS = {"semicolons": ";", "tabs": "\t"}
 # How many lines a note names, and how many lines into the file a header is looked for.
 _MOST_LINES = 5
 _DEEPEST_HEADER = 50
+_BLOCK = 1024  # rows that stay in the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,52 +97,81 @@ def read_samples(data: bytes, file: str, columns: Sequence[Column], where: str, 
     Raises InputError for what is no such file: another encoding or separator, decimal commas, a column that is missing
     or there twice, rows of another length, a cell that is no finite number, units that are not the scenario's.
     """
-    header, rows = _rows(data, file, columns, where, key)
+    rows = _rows(data, file, where, key)
+    header = _header(list(islice(rows, _DEEPEST_HEADER)), data, file, columns, where, key)
     wanted = [header.index(column.name) for column in columns]
-    notes = []
-    if rows and _names_units(rows[0][1]):
-        notes = _unit_notes([rows[0][1][i] for i in wanted], file, columns, where)
-        del rows[0]
-    lines = [line for line, _ in rows]
-    numbers = np.empty((len(rows), len(columns)))
-    digits, problems = [], []
-    for i, column in enumerate(columns):
-        cells = [row[wanted[i]] for _, row in rows]
-        bad = next((k for k, cell in enumerate(cells) if not _NUMBER.fullmatch(cell) or math.isinf(float(cell))), None)
-        if bad is not None:
-            place = f"{file}, line {lines[bad]}, column {column.name!r}"
-            problems.append(Problem(where, column.key, f"{place}: {_number_expected(cells[bad])}", repr(cells[bad])))
-            continue
-        numbers[:, i] = list(map(float, cells))
-        digits.append(_digit(cells) * abs(column.factor))
-    if problems:
-        raise InputError(*problems)
+    rows, notes = _rows(data, file, where, key), []
+    lines: list[int] = []
+    blocks: list[Floats] = []
+    places = [0.0] * len(columns)
+    bad: dict[int, Problem] = {}
+    ragged: tuple[int, list[str]] | None = None
+    next(rows)
+
+    def chosen(item: tuple[int, list[str]]) -> list[str]:
+        row = item[1]
+        return [row[place] for place in wanted]
+
+    # A block at a time, for the texts of a long record take many times the memory of its numbers.
+    while block := list(islice(rows, _BLOCK)):
+        ragged = ragged or next((item for item in block if len(item[1]) != len(header)), None)
+        if ragged:
+            continue  # to the end, for what is no CSV at all is told first
+        if not lines and _names_units(block[0][1]):
+            notes = _unit_notes([block[0][1][i] for i in wanted], file, columns, where)
+            del block[0]
+        numbers = np.empty((len(block), len(columns)))
+        for i, (column, cells) in enumerate(zip(columns, zip(*map(chosen, block), strict=True), strict=True)):
+            text = "\n".join(cells)
+            found = None if i in bad else _numbers(text, cells)
+            if found is not None:
+                numbers[:, i] = found
+                places[i] = min(places[i], _digit(text))
+            elif i not in bad:
+                k = next(k for k, cell in enumerate(cells) if not _is_number(cell))
+                place = f"{file}, line {block[k][0]}, column {column.name!r}"
+                bad[i] = Problem(where, column.key, f"{place}: {_number_expected(cells[k])}", repr(cells[k]))
+        lines += [line for line, _ in block]
+        blocks.append(numbers)
+    if ragged:
+        line, row = ragged
+        expected = f"{file}, line {line}: expected {len(header)} cells{_ragged_hint(row, len(header))}"
+        raise InputError(Problem(where, key, expected, str(len(row))))
+    if bad:
+        raise InputError(*(bad[i] for i in sorted(bad)))
+    numbers = np.concatenate([np.empty((0, len(columns))), *blocks])
+    digits = [float(10.0**least) * abs(column.factor) for least, column in zip(places, columns, strict=True)]
     notes += [note for i, column in enumerate(columns) if (note := _unwrap(numbers[:, i], lines, file, column))]
     with np.errstate(over="ignore"):  # told with the rates and accelerations that overflow
         numbers *= [column.factor for column in columns]
     return Samples(lines, numbers, digits, notes)
 
 
-def _rows(
-    data: bytes, file: str, columns: Sequence[Column], where: str, key: str
-) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The header, and every row that says anything with its line."""
+def _rows(data: bytes, file: str, where: str, key: str) -> Iterator[tuple[int, list[str]]]:
+    """Every row that says anything, with its line; the header is the first. Raises InputError for what is no CSV."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         remedy = f"iconv -f UTF-16 -t UTF-8 {shlex.quote(file)} > {shlex.quote(_beside(file, 'utf8'))}"
         raise InputError(Problem(where, key, f"{file} is text in UTF-16: expected UTF-8 ({remedy} writes it so)"))
     try:
-        text = data.decode("utf-8-sig")
-        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-        rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+        reader = csv.reader(io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline=""), strict=True)
+        for row in reader:
+            if any(map(str.strip, row)):
+                yield reader.line_num, row
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(Problem(where, key, f"{file} is no CSV file in UTF-8 ({error})")) from error
+
+
+def _header(
+    rows: list[tuple[int, list[str]]], data: bytes, file: str, columns: Sequence[Column], where: str, key: str
+) -> list[str]:
+    """The names of a file's columns, from its first rows. Raises InputError where one that is asked for is none."""
     if not rows:
         raise InputError(Problem(where, key, f"{file} is empty: expected a header that names its columns"))
     line, header = rows[0][0], list(map(str.strip, rows[0][1]))
     names = [column.name for column in columns]
     problems = []
     if not set(names) <= set(header):
-        layout = _layout(text, line, rows, names, file)
+        layout = _layout(data.decode("utf-8-sig", "replace"), line, rows, names, file)
         if layout:
             raise InputError(Problem(where, key, layout))
     for column in columns:
@@ -147,14 +179,9 @@ def _rows(
             problems.append(unknown(where, column.key, f"column of {file}", column.name, header))
         elif header.count(column.name) > 1:
             problems.append(Problem(where, column.key, f"{file} has more than one column {column.name!r}"))
-    ragged = next(((line, row) for line, row in rows[1:] if len(row) != len(header)), None)
-    if ragged:
-        line, row = ragged
-        expected = f"{file}, line {line}: expected {len(header)} cells{_ragged_hint(row, len(header))}"
-        problems.append(Problem(where, key, expected, str(len(row))))
     if problems:
         raise InputError(*problems)
-    return header, rows[1:]
+    return header
 
 
 def _layout(text: str, line: int, rows: list[tuple[int, list[str]]], names: list[str], file: str) -> str:
@@ -247,13 +274,35 @@ def _unit_notes(cells: list[str], file: str, columns: Sequence[Column], where: s
     return notes
 
 
-def _digit(numbers: Sequence[str]) -> float:
-    """What the last digit of numbers is worth, at most 1."""
-    text = " ".join(numbers)  # of which there may be millions: a search in one text is soon done
+def _is_number(cell: str) -> bool:
+    return bool(_NUMBER.fullmatch(cell)) and not math.isinf(float(cell))
+
+
+def _numbers(text: str, cells: Sequence[str]) -> Floats | None:
+    """Cells as numbers, None where one is none; `text`: all of them, a line each.
+
+    Of what is written with these characters alone, Python reads as a number just what _NUMBER says is one.
+    """
+    if _OTHER.search(text):
+        return None
+    try:
+        found = np.fromiter(map(float, cells), np.float64, len(cells))
+    except ValueError:
+        return None
+    return found if np.isfinite(found).all() else None
+
+
+def _digit(text: str) -> float:
+    """The place of the last digit of numbers, a line each, as a power of ten: -3 for thousandths, at most 0."""
+    signs = np.frombuffer(text.encode("ascii"), np.uint8)
+    points = np.flatnonzero(signs == ord("."))
+    if not ("e" in text or "E" in text):
+        ends = np.append(np.flatnonzero(signs <= ord(" ")), len(signs))
+        return -float((ends[np.searchsorted(ends, points)] - points).max(initial=1) - 1)
     least = -float(max(map(len, re.findall(r"\.([0-9]*)(?:\s|\Z)", text)), default=0))
     for places, exponent in re.findall(r"(?:\.([0-9]*))?[eE]([+-]?[0-9]+)", text):
         least = min(least, float(exponent) - len(places))
-    return float(10.0**least)
+    return least
 
 
 def _unwrap(samples: Floats, lines: list[int], file: str, column: Column) -> str:

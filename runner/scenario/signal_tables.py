@@ -142,7 +142,8 @@ def read_table(
         _expect_moderate(taken, file, channels, where)
         jittering = True
     table = spline(float(t[0]) - t0, dt, taken, ends, np.array(samples.digits[1:]))
-    _expect_moderate(np.abs(table.coefficients).max(axis=2), file, channels, where)
+    least, most = table.coefficients.min(axis=2), table.coefficients.max(axis=2)
+    _expect_moderate(np.maximum(most, -least), file, channels, where)
     if jittering:
         steps = np.diff(t)
         missed = _missed(table, rows - rows[0] + table.t0, values)

@@ -149,12 +149,14 @@ def spline(t0: float, dt: float, samples: Floats, ends: Ends, digit: Floats | fl
     times = interval * np.arange(samples.shape[0])
     fit = _cubic_spline(times, np.ldexp(samples, -size), ends)
     powers = size[:, None] - unit * np.arange(4)
+    coefficients: Floats = np.empty((len(times) - 1, samples.shape[1], 4))
     with np.errstate(over="ignore"):
-        coefficients = np.ldexp(fit.c[::-1].transpose(1, 2, 0), powers)
+        np.ldexp(fit.c[::-1].transpose(1, 2, 0), powers, out=coefficients)
+    del fit  # as large, and a long record's is half a gigabyte
     if ends == "periodic":
         t0 = 0.0 - -t0 % (dt * len(coefficients))  # what repeats needs no large times
     coarse: Floats = np.maximum(digit, _DOUBLE * np.spacing(np.abs(samples).max(axis=0)))
-    return Spline(t0, dt, np.ascontiguousarray(coefficients), ends, _bounds(coefficients, dt, coarse))
+    return Spline(t0, dt, coefficients, ends, _bounds(coefficients, dt, coarse))
 
 
 def resampled(t: Floats, samples: Floats, intervals: int, ends: Ends) -> Floats:

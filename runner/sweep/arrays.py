@@ -46,6 +46,10 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
     if len(set(lengths.values())) != 1 or 0 in lengths.values():
         text = "the columns of a batch must be non-empty arrays of one length"
         raise InputError(Problem(scenario.source, "", text, str(lengths)))
+    found = scenario.implausible_run(arrays)
+    if found:
+        key = next(iter(arrays)) if len(arrays) == 1 else ""
+        raise InputError(Problem(scenario.source, key, f"run {found[0]}: {found[1]}"))
     slots, runs = scenario.slots_for(arrays), max(lengths.values())
     work = work_for(scenario, slots)
     need = COPIES * 8 * runs * (len(metrics_schema(work.system)) + len(arrays) + len(work.parameters))

@@ -78,9 +78,13 @@ class AxisChecks:
             text = "no number that runs of one kernel may differ in: expected values = [...] beside the tie"
             return [Problem(self.sweep.source, label, text)]
         if axis.kind != "tie" and not axis.values:
-            known = {**self.numeric, **dict.fromkeys(_document_keys(self.sweep.scenario))}
+            numeric = self.sweep.scenario.numeric_keys()
+            known = {**numeric, **dict.fromkeys(_document_keys(self.sweep.scenario))}
             if axis.key not in known:
                 return [unknown(self.sweep.source, label, "key", axis.key, known)]
+            if axis.key in numeric:
+                text = "is out of the equations where it is 0: expected { values = [...] }, or a range without 0"
+                return [Problem(self.sweep.source, label, text, given_text(axis.as_toml()))]
             text = "no number that runs of one kernel may differ in: expected { values = [...] } or { each = [...] }"
             return [Problem(self.sweep.source, label, text, given_text(axis.as_toml()))]
         return []

@@ -33,11 +33,12 @@ from springline.runner.scenario import (
     names_file,
     portable_text,
     records,
+    weighs,
 )
 from springline.runner.scenario import FOLDER as TABLES
 from springline.runner.sweep import sampling
 from springline.runner.sweep.axis_checks import AxisChecks
-from springline.runner.sweep.drawing import Columns, Drawing
+from springline.runner.sweep.drawing import Columns, Drawing, grid_values
 from springline.runner.sweep.sweep import Axis, Sweep
 from springline.runner.sweep.work import Outcome, Work, work_for
 
@@ -60,6 +61,7 @@ _LARGEST_CHUNK = 2048
 _CHUNKS = 32
 _FEWEST_CHUNKS = 8
 _TRAJECTORY_BYTES = 64e6
+_DRAWN_AT_ONCE = 8192
 _MOST_STEPS_IN_ALL = 2**63 - 1  # the counter of the loop's progress
 
 
@@ -109,6 +111,7 @@ class Plan:
         self.sweep = sweep
         self.runs = sweep.samples * math.prod(len(axis.values) for axis in sweep.axes if axis.kind == "each")
         grouping = {axis.key for axis in sweep.axes if _switches(axis.key, axis.reach(sweep.axes))}
+        grouping |= {axis.key for axis in sweep.axes if _takes_out_a_mount(axis, sweep)}
         self._numeric = {k: v for k, v in sweep.scenario.numeric_keys().items() if k not in grouping}
         self._free = [axis for axis in sweep.axes if axis.kind != "tie"]
         self._outer = [axis for axis in self._free if self._groups_runs(axis)]
@@ -179,6 +182,24 @@ class Plan:
             for joint in group.work.system.joints:
                 found.setdefault(joint.name, joint)
         return tuple(found.values())
+
+    def expect_plausible(self) -> None:
+        """Raise InputError for the first run with masses and inertias that no arm has; before one is started, that is.
+
+        Making a Plan does not tell, for it draws no run, and who replays one needs to know nothing of the others.
+        """
+        axes = [axis for axis in self.sweep.axes if axis.key in self._numeric and weighs(axis.key)]
+        for group in self.groups if axes else ():
+            for first in range(0, group.runs, _DRAWN_AT_ONCE):
+                runs = min(_DRAWN_AT_ONCE, group.runs - first)
+                columns = self.columns(Chunk(-1, group, group.first + first, runs))
+                found = group.scenario.implausible_run({k: v for k, v in columns.items() if k in self._numeric})
+                if found is None:
+                    continue
+                run, text = found
+                key = f"vary.{axes[0].key}" if len(axes) == 1 else "vary"
+                remedy = "leave such values out of what varies, or bounds in the class refuse them by name"
+                raise InputError(Problem(self.sweep.source, key, f"run {group.first + first + run}: {text} ({remedy})"))
 
     # Numbers
 
@@ -426,6 +447,31 @@ class Plan:
 def _switches(key: str, numbers: tuple[float, ...]) -> bool:
     """Whether a key takes something out of the structure in some runs and not in others."""
     return absent_at_zero(key) and 0.0 in numbers and any(numbers)
+
+
+def _takes_out_a_mount(axis: Axis, sweep: Sweep) -> bool:
+    """Whether a key makes the arm stand as the base does in some runs and not in others: the first have no mount.
+
+    That is so where all of `mount`, or of `mount_rpy`, is exactly zero. Equations without it round otherwise, so a
+    run by itself, which has none, would not have the bits of one that shares a kernel with others.
+    """
+    table, _, rest = axis.key.partition(".")
+    name, _, place = rest.partition(".")
+    given = sweep.scenario.document["base_motion"].get(name)
+    if table != "base_motion" or name not in ("mount", "mount_rpy") or not place.isdecimal() or given is None:
+        return False
+    reached = {other.key: _taken(other, sweep) for other in sweep.axes}
+    own = reached[axis.key]
+    others = [reached.get(f"base_motion.{name}.{k}", (value,)) for k, value in enumerate(given) if str(k) != place]
+    return 0.0 in own and any(own) and all(0.0 in numbers for numbers in others)
+
+
+def _taken(axis: Axis, sweep: Sweep) -> tuple[float, ...]:
+    """Numbers that an axis takes, as far as they are zero or not: in a grid, also those of a range."""
+    source = next((other for other in sweep.axes if other.key == axis.tie), axis)
+    if source.points and not axis.values:
+        return tuple(float(value) for value in axis.factor * grid_values(source))
+    return axis.reach(sweep.axes)
 
 
 def _tied_value(axis: Axis, value: Any, place: int) -> Any:

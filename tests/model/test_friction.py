@@ -1,10 +1,14 @@
 """Damping and friction: what they take is what the energy loses, and where they are zero there is nothing of them."""
 
+import re
+from pathlib import Path
+
 import casadi as ca
 import numpy as np
 import pytest
 
-from springline.model.drive import FRICTION, friction_parameters
+from springline.model.drive import FRICTION, friction, friction_parameters
+from springline.model.parameters import Values
 from springline.model.structure import Structure
 from springline.model.system import System
 
@@ -155,3 +159,11 @@ def test_a_start_on_the_reference_carries_the_friction_too(damped, make_model):
     dx = on("plant", w[6:9], w[9:12], w[12:15], x, np.zeros(2), p=p)
     assert abs(x[2]) == 3.0
     np.testing.assert_allclose(dx[2:4], w[4:6], atol=1e-8)
+
+
+def test_the_share_of_coulomb_friction_that_the_docs_say() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "scenarios.md").read_text("utf-8")
+    told = re.search(r"at this rate it has (\d+) % of F, at ten times as much ([\d.]+) %", page)
+    rate, p = ca.SX.sym("rate"), Values({"link_coulomb": ca.SX(8.0), "coulomb_velocity": ca.SX(0.01)})
+    shares = ca.Function("share", [rate], [friction(rate, p, "link") / 8.0])
+    assert told and [f"{100 * float(shares(0.01)):.0f}", f"{100 * float(shares(0.1)):.1f}"] == list(told.groups())

@@ -74,6 +74,7 @@ def batch(
     for note in loaded.scenario.notes:
         complain(note)
     plan = Plan(loaded)
+    plan.expect_plausible()
     destination = output or str(Path("results", Path(sweep).stem))
     dataset = Dataset(place(destination))
     begun = dataset.is_begun(resume=resume)

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from springline.runner.cli.terminal import print_json, print_table
+from springline.runner.cli.options import Changes, NoCode, overrides
+from springline.runner.cli.terminal import complain, print_json, print_table
+from springline.runner.files import InputError, Problem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from springline.model.parameters import Joint, Parameter
+    from springline.runner.scenario import Scenario
 
 Row = dict[str, Any]
 
@@ -30,17 +33,31 @@ class What(StrEnum):
 
 def list_(
     what: Annotated[What, typer.Argument(help="Which list.")],
+    scenario: Annotated[
+        str,
+        typer.Argument(help="Whose parameters: a TOML file, or the name of a packaged scenario.", show_default=False),
+    ] = "",
+    changes: Changes = None,
+    no_code: NoCode = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
-    """List mechanisms, controllers, laws, scenarios and the like."""
-    rows = {
+    """List mechanisms, controllers, laws, scenarios and the like.
+
+    With a scenario, the parameters of its own arm, drive and controller, and their values.
+    """
+    if scenario and what is not What.parameters:
+        raise InputError(Problem(scenario, "", f"only goes with springline list parameters, not with {what.value}"))
+    if changes and not scenario:
+        raise InputError(Problem("", "", "--set goes with a scenario: springline list parameters SCENARIO --set ..."))
+    listed = {
         "mechanisms": mechanisms,
         "controllers": controllers,
         "laws": laws,
         "parameters": parameters,
         "scenarios": scenarios,
         "sweeps": sweeps,
-    }[what.value]()
+    }
+    rows = _own_rows(scenario, changes) if scenario else listed[what.value]()
     if as_json:
         print_json("list", rows, {})
         return
@@ -114,6 +131,51 @@ def parameters() -> list[Row]:
     ]
 
 
+def parameters_of(scenario: Scenario) -> list[Row]:
+    """Every parameter that a scenario has: as `parameters`, with the value there instead of the mechanism.
+
+    Those of its controller, its law and its base motion are among them where these have any of their own, and the
+    plant's where [plant] says anything of them; else the mechanism's and the drive's are the plant's, too.
+    """
+    from springline.model.base_motion import MOTIONS
+    from springline.model.drive import DRIVES, EPSILON, friction_parameters
+    from springline.model.mechanisms import MECHANISMS
+    from springline.model.system import control_parameters, own_control_tables
+
+    structure = scenario.structure()
+    mechanism = MECHANISMS[structure.mechanism].of_size(structure.size)
+    split = (EPSILON,) if structure.drive == "elastic" else ()
+    drive = (*DRIVES[structure.drive].parameters(mechanism), *friction_parameters(structure.drive))
+    given = scenario.document["plant"]
+    tables: dict[str, tuple[Parameter, ...]] = {
+        "mechanism": mechanism.parameters,
+        "drive": (*drive, *split),
+        "plant": tuple(item for item in (*mechanism.parameters, *drive) if item.name in given),
+        "control": control_parameters(mechanism, structure.drive),
+        **{f"control.{name}": declared for name, declared in own_control_tables(structure).items()},
+    }
+    if structure.base_motion.own:
+        tables["base_motion"] = MOTIONS[structure.base_motion.own].parameters
+    rows = [row for table, declared in tables.items() for row in _rows(table, declared, mechanism.joints)]
+    return [{"key": row["key"], "value": _value(scenario, row["key"]), **row} for row in rows]
+
+
+def _value(scenario: Scenario, key: str) -> object:
+    found: Any = scenario.document
+    for name in key.split("."):
+        found = found[name]
+    return found
+
+
+def _own_rows(name: str, changes: list[str] | None) -> list[Row]:
+    from springline.runner.scenario import load_scenario
+
+    scenario = load_scenario(name, overrides(changes, name))
+    for note in scenario.notes:
+        complain(note)
+    return parameters_of(scenario)
+
+
 def scenarios() -> list[Row]:
     """Every packaged scenario with the comment that it begins with."""
     from springline.runner.scenario import packaged_scenarios
@@ -155,6 +217,8 @@ def _rows(table: str, declared: tuple[Parameter, ...], joints: tuple[Joint, ...]
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, dict):
+        return "".join(f"{{ {name} = {_text(item)} }}" for name, item in value.items())
     if isinstance(value, list):
         return ", ".join(_text(item) for item in value)
     return f"{value:.6g}" if isinstance(value, float) else str(value)

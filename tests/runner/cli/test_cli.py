@@ -852,6 +852,76 @@ def rows_of(what: str) -> list[dict[str, object]]:
     return rows
 
 
+def test_list_parameters_of_a_scenario_tells_its_own() -> None:
+    """An arm of a user's, which no other list has, on either drive; and what --set makes of it."""
+    arm = Path(__file__).parents[3] / "examples" / "own_mechanism" / "deck.toml"
+    listed = json.loads(done("list", "parameters", str(arm), "--json"))["rows"]
+    rows = {row["key"]: row for row in listed}
+    assert rows["mechanism.m2"] == {
+        "key": "mechanism.m2",
+        "value": 56.5,
+        "unit": "kg",
+        "default": 56.5,
+        "bounds": "a finite number",
+        "meaning": "mass of the upper arm",
+    }
+    assert len(rows) == len(listed) and len(rows["control.mu"]["value"]) == 3
+    assert not any(key.startswith(("plant.", "base_motion.")) for key in rows)
+    changes = ["plant.m2={ scale = 1.5 }", "plant.k1=3e5", "drive.link_viscous=2.0", "mechanism.m3=20"]
+    changed = [word for change in changes for word in ("--set", change)]
+    shown = done("list", "parameters", str(arm), *changed)
+    assert "{ scale = 1.5 }" in shown
+    own = {row["key"]: row for row in json.loads(done("list", "parameters", str(arm), *changed, "--json"))["rows"]}
+    assert own.keys() - rows.keys() == {"plant.m2", "plant.k1"}
+    assert own["plant.k1"]["value"] == 3e5 and own["plant.k1"]["bounds"] == "a number > 0"
+    assert own["mechanism.m3"]["value"] == 20.0 and own["mechanism.m3"]["default"] == 26.4
+    assert own["drive.link_viscous"]["value"] == [2.0, 2.0, 2.0]
+    rigid = json.loads(done("list", "parameters", str(arm), "--set", "drive.kind=rigid", "--json"))["rows"]
+    gone = rows.keys() - {row["key"] for row in rigid}
+    assert {"drive.k1", "drive.spring_damping", "drive.epsilon", "control.K_f"} <= gone
+
+
+def test_list_parameters_of_a_scenario_has_those_of_its_classes(elsewhere: Path) -> None:
+    (elsewhere / "own.py").write_text(OWN_CLASSES)
+    (elsewhere / "own.toml").write_text(
+        '[control]\ncontroller = "own.py:Proportional"\n[control.proportional]\nslope = [2.0, 3.0]\n'
+        '[base_motion]\nkind = "own.py:Ramp"\nspeed = 0.25\n'
+    )
+    rows = {row["key"]: row for row in json.loads(done("list", "parameters", "own.toml", "--json"))["rows"]}
+    assert rows["control.proportional.slope"]["value"] == [2.0, 3.0]
+    assert rows["control.proportional.slope"]["unit"] == ["N/m", "N m/rad"]
+    assert rows["base_motion.speed"]["value"] == 0.25 and rows["base_motion.speed"]["default"] == 0.1
+    every = load_scenario("own.toml").numeric_keys()
+    split = [key.rpartition(".") for key in every]
+    missing = {stem if last.isdigit() else f"{stem}.{last}" for stem, _, last in split} - rows.keys()
+    assert all(key.startswith(("plant.", "reference.", "initial.")) for key in missing), missing
+    assert "--no-code refuses that" in refused("list", "parameters", "own.toml", "--no-code")
+
+
+def test_list_of_anything_else_takes_no_scenario() -> None:
+    assert "only goes with springline list parameters" in refused("list", "laws", "paper/nominal")
+    assert "--set goes with a scenario" in refused("list", "parameters", "--set", "mechanism.m3=2")
+    assert "mechanism.m33" in refused("list", "parameters", "paper/nominal", "--set", "mechanism.m33=2")
+
+
+OWN_CLASSES = """
+from springline.model import BaseMotion, Control, Controller, Parameter
+
+class Proportional(Controller):
+    parameters = (Parameter("slope", "{F}/{q}", 1.0, "of the command over the error", per_joint=True),)
+
+    def control(self, r, y, z, model, p):
+        error = r.q - y.q1
+        return Control(p.slope * error, error)
+
+class Ramp(BaseMotion):
+    parameters = (Parameter("speed", "m/s", 0.1, "forward"),)
+
+    def motion(self, t, p):
+        return [p.speed * t, 0, 0, 0, 0, 0]
+"""
+
+
 def test_list_parameters_tells_all_that_the_model_declares() -> None:
     listed = rows_of("parameters")
     rows = {row["key"]: row for row in listed if row["mechanism"] in ("", "transfer_manipulator")}

@@ -64,6 +64,23 @@ def test_a_recorded_base_motion_is_set_against_the_error(at_sea: Run) -> None:
     assert len(figures["error_against_base"].axes) == 2 * 6
 
 
+def test_forces_on_the_links_are_seen_against_none() -> None:
+    """On those joints that any acts on; what does not change is seen by its size, too."""
+    quiet = {"disturbance__kind": "sine", "simulation__duration": 0.1}
+    assert "disturbance" not in run_figures(*simulated("paper/nominal", **quiet))
+    steady = simulated("paper/nominal", **quiet, disturbance__lift={"offset": 1500.0, "terms": []})
+    (axes,) = run_figures(*steady)["disturbance"].axes
+    assert axes.get_ylabel() == "lift\ndisturbance $F_d$ [N]"
+    low, high = axes.get_ylim()
+    assert low < 0.0 and high > 1500.0
+    assert [line.get_label() for line in axes.lines] == ["no force", "force, positive along +q₁"]
+    both = {"lift": {"offset": 0.0, "terms": [{"amplitude": 9.0, "omega": 8.0}]}, "rotation": {"offset": -3.0}}
+    run = simulated("paper/nominal", **quiet, **{f"disturbance__{joint}": table for joint, table in both.items()})
+    upper, lower = run_figures(*run)["disturbance"].axes
+    assert np.array_equal(upper.lines[1].get_ydata(), run[1].trajectory["disturbance_lift"].to_numpy())
+    assert lower.get_ylabel() == "rotation\ndisturbance $F_d$ [N · m]" and lower.get_ylim()[0] < -3.0
+
+
 def test_a_run_that_stopped_says_so_and_when(diverged: Run) -> None:
     figures = run_figures(*diverged)
     assert set(figures) == ALWAYS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import subprocess
 import time
 from pathlib import Path
@@ -194,6 +195,24 @@ def test_jittering_rows_give_a_band_limited_signal_back(
     dense = np.linspace(t[0], t[-1], 1001)
     allowed = sum(a * (omega * longest) ** 4 for a, omega, _ in sines) / 30
     assert np.abs(evaluate(table, dense) - signal(dense)).max() <= allowed + 1e-12
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.45])
+def test_accelerations_of_jittering_rows_are_as_right_as_the_docs_say(share: float) -> None:
+    page = " ".join((Path(__file__).parents[3] / "docs" / "records.md").read_text("utf-8").split())
+    told = re.search(
+        r"the acceleration to ([\d.]+) A ω² \(ω h\)² six rows away from the ends, ([\d.]+) A ω² \(ω h\)²", page
+    )
+    assert told
+    for seed in range(20):
+        generator = np.random.default_rng(seed)
+        t = jittered(generator, int(generator.integers(40, 200)), share)
+        omega, phase, longest = generator.uniform(0.1, 0.63), generator.uniform(0, 6.3), np.diff(t).max()
+        table, dense = read(written(t, np.sin(omega * t + phase))).spline, np.linspace(t[0], t[-1], 2001)
+        off = np.abs(evaluate(table, dense, 2) + omega**2 * np.sin(omega * dense + phase))
+        inner = (dense >= t[6]) & (dense <= t[-7])
+        allowed = omega**2 * (omega * longest) ** 2
+        assert off[inner].max() <= float(told[1]) * allowed and off.max() <= float(told[2]) * allowed
 
 
 @given(st.floats(0.001, 0.3), st.booleans(), SEEDS)
