@@ -170,8 +170,10 @@ def commanded(
         raise ValueError(f"controller {controller.name}: control: expected a Control, got {type(given).__name__}")
     for what, items in (("dz", {} if callable(given.dz) else given.dz), ("diagnostics", given.diagnostics)):
         if not isinstance(items, Mapping):
-            text = f"{what}: expected a dict of names and expressions, got {type(items).__name__}"
-            raise ValueError(f"controller {controller.name}: {text}")
+            raise ValueError(
+                f"controller {controller.name}: {what}: expected a dict of names and expressions, "
+                f"got {type(items).__name__}"
+            )
 
     def column(what: str, value: ca.SX, rows: int) -> ca.SX:
         shape = ca.SX(value).shape

@@ -218,8 +218,9 @@ def check_mechanism(mechanism: Mechanism) -> None:
     if not isinstance(terms, tuple | list) or len(terms) != len(joints) or not all(map(_are_terms, terms)):
         raise ValueError(f"{owner}: reference_terms: expected a tuple of SineTerm for each joint, got {terms!r}")
     if not isinstance(mechanism.control_defaults, Mapping):
-        text = f"expected a dict of names and numbers, got {mechanism.control_defaults!r}"
-        raise ValueError(f"{owner}: control_defaults: {text}")
+        raise ValueError(
+            f"{owner}: control_defaults: expected a dict of names and numbers, got {mechanism.control_defaults!r}"
+        )
     for name, value in mechanism.control_defaults.items():
         if not is_number(value):
             expect_numbers(owner, f"control_defaults, {name}", value, len(joints))
