@@ -5,6 +5,7 @@ Each function raises ValueError, with the class's name and what was expected, fo
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
 from collections import Counter
@@ -47,8 +48,36 @@ def expect_parameters(owner: str, what: str, parameters: object, joints: Sequenc
         for text in (item.unit, item.meaning):
             expect_text(owner, f"{what}, {item.name}", text)
         for value in item.defaults(joints) if joints or not item.per_joint else ():
-            if isinstance(value, bool) or not isinstance(value, int | float) or not item.bounds.holds(value):
+            if not is_number(value) or not item.bounds.holds(value):
                 raise ValueError(f"{owner}: {what}, {item.name}: expected as default {item.bounds}, got {value!r}")
+
+
+def expect_methods(item: object, base: type) -> None:
+    """What the class of `item` has instead of a method of `base` takes the arguments that it will be called with."""
+    for name, method in inspect.getmembers(base, inspect.isfunction):
+        own = getattr(type(item), name)
+        if name.startswith("_") or own is method:
+            continue
+        wanted = list(inspect.signature(method).parameters)
+        try:
+            given = inspect.signature(getattr(item, name))
+            given.bind(*wanted[1:])
+        except TypeError as error:
+            found = f"{name}{inspect.signature(own)}" if inspect.isfunction(own) else repr(own)
+            raise ValueError(f"{type(item).__name__}: expected {name}({', '.join(wanted)}), got {found}") from error
+
+
+def expect_numbers(owner: str, what: str, values: object, count: int) -> None:
+    """A tuple or list of so many finite numbers."""
+    if not isinstance(values, tuple | list) or len(values) != count:
+        raise ValueError(f"{owner}: {what}: expected {count} entries, one per joint, got {values!r}")
+    if not all(is_number(value) and math.isfinite(value) for value in values):
+        raise ValueError(f"{owner}: {what}: expected finite numbers, got {values!r}")
+
+
+def is_number(value: object) -> bool:
+    """Whether it is a plain number, which True is not."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def column(owner: str, what: str, value: object, rows: int, known: Set[int]) -> ca.SX:
@@ -59,13 +88,18 @@ def column(owner: str, what: str, value: object, rows: int, known: Set[int]) -> 
     if made.shape != (rows, 1):
         shape = "a scalar" if rows == 1 else f"{rows} x 1"
         raise ValueError(f"{owner}: {what}: expected {shape}, got {made.shape[0]} x {made.shape[1]}")
+    expect_given(owner, what, made, known)
+    return made
+
+
+def expect_given(owner: str, what: str, made: ca.SX, known: Set[int]) -> None:
+    """An expression of what its author was given, symbols of `known`, without NaN."""
     foreign = [item.name() for item in ca.symvar(made) if hash_of(item) not in known]
     if foreign:
         raise ValueError(f"{owner}: {what}: depends on {foreign[0]!r}, which it was not given")
     if _has_nan(made):  # a float of a symbol is one, silently
         text = "contains NaN, which float() and the functions of math make of an expression: use those of casadi"
         raise ValueError(f"{owner}: {what}: {text}")
-    return made
 
 
 def _has_nan(expression: ca.SX) -> bool:

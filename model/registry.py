@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
+from springline.model.declared import expect_methods
+
 T = TypeVar("T")
 
 
@@ -35,6 +37,7 @@ class Registry(dict[str, T]):
 
     def bring(self, key: str, item: T) -> None:
         """Add what a user's file holds. Raises ValueError if it is not complete, or called as one that there is."""
+        expect_methods(item, self.base)
         self._check(item)
         name = str(getattr(item, "name", ""))
         if super().__contains__(name):

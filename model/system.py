@@ -34,7 +34,7 @@ from springline.model.control import (
     commanded,
     fast_control,
 )
-from springline.model.declared import column, symbols_of
+from springline.model.declared import column, expect_given, symbols_of
 from springline.model.drive import (
     DRIVES,
     EPSILON,
@@ -82,6 +82,8 @@ from springline.model.tip import tip_motion
 
 # Relative to the largest eigenvalue: a mass matrix below this is singular to the precision of what is computed with it.
 _SINGULAR = 1e-12
+# The Functions of what a controller says, which may be a user's. What else users say is looked at where it comes in.
+_OF_CONTROLLER = ("control", "rates", "update")
 
 
 def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tuple[Parameter, ...]:
@@ -424,6 +426,9 @@ class System:
     ) -> dict[str, ca.Function]:
         with as_written():
             flat = ca.cse([ca.densify(o) for o in outputs])
+            if name in _OF_CONTROLLER:
+                owner = f"controller {self.controller.name}"
+                expect_given(owner, "control", ca.vertcat(*map(ca.vec, flat)), symbols_of(*map(ca.vec, inputs), self.p))
             return {name: ca.Function(name, [*inputs, self.p], flat, [*names_in, "p"], names_out)}
 
     def _named(self, name: str, inputs: list[ca.SX], terms: list[ca.SX], names_in: list[str]) -> dict[str, ca.Function]:
@@ -489,7 +494,7 @@ class System:
             for law in {**LAWS, self.structure.law: self.controller.law}.values():
                 with noted() as terms:
                     rate = law.with_form(self.structure.log_form).rate(sigma, self._control)
-                [rate], _ = self._associated([rate], terms)
+                [rate], _ = self._associated([ca.SX(rate)], terms)
                 result |= function(f"law_{law.name}", [sigma], [rate], ["sigma"], ["dsigma"])
         if self.tip is not None:
             result |= function("tip", [base.b, base.db, x], [self.tip], ["b", "db", "x"], ["tip"])

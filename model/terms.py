@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from springline.model.declared import expect_names
+from springline.model.declared import expect_names, expect_text
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,12 @@ def named(name: str, value: ca.SX) -> ca.SX:
 
 @contextmanager
 def section(title: str, equations: str = "") -> Iterator[None]:
-    """Within, what is named belongs to this part; `equations`: where it is written, "(18), (19)" in docs/paper.md."""
+    """Within, what is named belongs to this part; `equations`: where it is written, "(18), (19)" in docs/paper.md.
+
+    Raises ValueError for a text that a comment in C cannot hold.
+    """
+    for text in (title, equations):
+        expect_text("section", "title and equations", text)
     before = _SECTION.set((title, equations))
     try:
         yield

@@ -226,7 +226,7 @@ def doors() -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("room", doors())
+@pytest.mark.parametrize("room", [*doors(), "codegen"])
 def test_a_door_shows_its_public_names_alone(room: str) -> None:
     package = importlib.import_module("springline" if room == "springline" else f"springline.{room}")
     names = dir(package)
@@ -236,6 +236,12 @@ def test_a_door_shows_its_public_names_alone(room: str) -> None:
         assert not name.startswith("_") or name == "__version__"
     with pytest.raises(AttributeError):
         _ = package.no_such_name
+
+
+def test_a_package_of_rooms_shows_its_rooms_and_nothing_else() -> None:
+    rooms = {room.split(".")[1] for room in doors() if room.startswith("codegen.")}
+    assert set(dir(importlib.import_module("springline.codegen"))) == rooms
+    assert dir(importlib.import_module("springline.benchmarks")) == []
 
 
 def test_every_name_of_a_door_is_wanted_outside() -> None:

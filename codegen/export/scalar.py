@@ -52,6 +52,34 @@ class _SinglePrecision:
         return _SINGLE.get(value, value)
 
 
+# Of the formula of a constant that comes from several parameters: longer than that, nobody reads it, and those of a
+# chain in space would fill megabytes. The symbols that it has tell more.
+_LONGEST = 120
+
+
+@dataclass(frozen=True, slots=True)
+class _Constant:
+    """A constant that comes from parameters.
+
+    name     what it is called, "" where it comes from several
+    text     what it is: unit and meaning, or a formula; "" where that would be too long
+    symbols  of the parameters that it comes from, in their order
+    """
+
+    name: str
+    text: str
+    symbols: tuple[str, ...]
+
+    @property
+    def told(self) -> str:
+        """What a reader of the C is told."""
+        if self.text:
+            return self.text
+        shown = [symbol for k, symbol in enumerate(self.symbols) if len(", ".join(self.symbols[: k + 1])) <= _LONGEST]
+        more = len(self.symbols) - len(shown)
+        return f"from {', '.join(shown)}" + (f" and {more} more" if more else "")
+
+
 class _Values(ValueGraph):
     """Value graph of an export: references, measurements, base motion and commands come from outside."""
 
@@ -60,9 +88,9 @@ class _Values(ValueGraph):
         self._single = export.real == "float"
         self.tunable = tuple(slot.key for slot in export.tunable_slots)
         column = {slot: k for k, slot in enumerate(export.tunable)}
-        self.constants: dict[int, tuple[str, str]] = {}
-        """Constants that come from parameters, by node: what each is called, "" where it comes from several, and what
-        it is: unit and meaning, or a formula."""
+        self.constants: dict[int, _Constant] = {}
+        """Constants that come from parameters, by node."""
+        self._places = {slot.symbol: i for i, slot in enumerate(export.slots)}
         self._known = {
             "p": [
                 self.leaf("p", column[i], Binding.RUN, varies=True) if i in column else self._baked(slot, value)
@@ -75,7 +103,7 @@ class _Values(ValueGraph):
     def _baked(self, slot: Slot, value: float) -> int:
         """The constant of a parameter: one of its own, whatever else is equal to it."""
         node = self._intern(("baked", slot.key), Node(None, (), Binding.CONSTANT, value=value, source=("baked", 0)))
-        self.constants[node] = slot.symbol, f"{slot.unit}; {slot.meaning}"
+        self.constants[node] = _Constant(slot.symbol, f"{slot.unit}; {slot.meaning}", (slot.symbol,))
         return node
 
     def _folded(self, op: int, arguments: tuple[int, ...], value: float) -> int:
@@ -84,14 +112,21 @@ class _Values(ValueGraph):
         node = self._intern(
             ("folded", op, arguments), Node(None, (), Binding.CONSTANT, value=value, source=("folded", 0))
         )
-        self.constants.setdefault(node, ("", _formula(op, [self._text(i) for i in arguments])))
+        if node not in self.constants:
+            several = [self.constants[i] for i in arguments if i in self.constants]
+            symbols = tuple(sorted({s for constant in several for s in constant.symbols}, key=self._places.__getitem__))
+            formula = all(constant.text for constant in several) and _formula(op, [self._text(i) for i in arguments])
+            self.constants[node] = _Constant("", formula if formula and len(formula) <= _LONGEST else "", symbols)
         return node
 
     def _text(self, i: int) -> str:
         """A constant in the formula of another."""
-        value = self.nodes[i].value
-        short = f"{value:g}"
-        name, text = self.constants.get(i, (short if float(short) == value else f"{value!r}", ""))
+        if i in self.constants:
+            name, text = self.constants[i].name, self.constants[i].text
+        else:
+            value = self.nodes[i].value
+            short = f"{value:g}"
+            name, text = short if float(short) == value else f"{value!r}", ""
         return name or (text if text.replace("_", "").isalnum() else f"({text})")
 
     def _operation(self, op: int, arguments: tuple[int, ...], origin: str) -> int:
@@ -326,7 +361,7 @@ class ScalarPrinter:
                 if i not in self._graph.constants:
                     return literal(node.value, self._real)
                 unnamed = sum(_OWN.fullmatch(name) is not None for name in constants.values())
-                return constants.setdefault(i, self._graph.constants[i][0] or names.get(i) or f"c{unnamed}")
+                return constants.setdefault(i, self._graph.constants[i].name or names.get(i) or f"c{unnamed}")
             if i not in ready:
                 ready.add(i)
                 if given(i) != names[i]:
@@ -355,8 +390,8 @@ class ScalarPrinter:
             kind = "int" if node.op in MASKS else self._real
             lines.append(f"const {kind} {names[i]} = {text};")
             ready.add(i)
-        for i, (name, _) in self._graph.constants.items():
-            if name in defined:
+        for i, constant in self._graph.constants.items():
+            if constant.name in defined:
                 value(i)
         # What is only handed on needs no name.
         values = [given(i) if self._is_input(i) and i not in ready else value(i) for i in wanted]
@@ -368,11 +403,12 @@ class ScalarPrinter:
 
     def _constant_lines(self, used: Mapping[int, str]) -> list[str]:
         """Definitions of the constants that come from parameters, each with what it is; parameters first."""
-        nodes = sorted(used, key=lambda i: (not self._graph.constants[i][0], i if self._graph.constants[i][0] else 0))
+        known = self._graph.constants
+        nodes = sorted(used, key=lambda i: (not known[i].name, i if known[i].name else 0))
         values = [literal(self._graph.nodes[i].value, self._real) for i in nodes]
         texts = [f"const {self._real} {used[i]} = {value};" for i, value in zip(nodes, values, strict=True)]
         width = max(map(len, texts), default=0)
-        return [f"{text:{width}} /* {self._graph.constants[i][1]} */" for text, i in zip(texts, nodes, strict=True)]
+        return [f"{text:{width}} /* {known[i].told} */" for text, i in zip(texts, nodes, strict=True)]
 
     def _parts(self, needed: Sequence[int], sections: Sequence[Section]) -> dict[int, int]:
         """In which section each node is computed: in the first that needs it; what none needs comes last."""
@@ -397,7 +433,7 @@ class ScalarPrinter:
         names = dict(self._names)
         for i, label in zip(wanted, labels, strict=True):
             names.setdefault(i, label)
-        taken = {*names.values(), *(name for name, _ in self._graph.constants.values() if name)}
+        taken = {*names.values(), *(constant.name for constant in self._graph.constants.values() if constant.name)}
         for i, label in (pair for section in sections for pair in section.names):
             if label not in taken and not _is_taken(label) and names.setdefault(i, label) == label:
                 taken.add(label)

@@ -7,7 +7,11 @@
 
 #include "springline.h"
 
-enum { SAMPLES = 1000, STEPS_PER_SAMPLE = 10, INSTRUCTIONS_PER_TICK = 40, PAINTED = 8192, PAINT = 0x5a };
+#ifndef SAMPLES
+#define SAMPLES 1000
+#endif
+
+enum { STEPS_PER_SAMPLE = 10, INSTRUCTIONS_PER_TICK = 40, PAINTED = 8192, PAINT = 0x5a };
 
 static volatile uint32_t *const systick = (volatile uint32_t *)0xE000E010u; /* control, reload, value */
 
@@ -63,12 +67,7 @@ static int loop(cost *control, cost *plant, int with_stack) {
     uint32_t start;
     unsigned bytes;
     status = springline_signals(&controller, (springline_real)k * period, &reference, &base);
-    measurement.q1_lift = state.q1_lift;
-    measurement.q1_rotation = state.q1_rotation;
-    measurement.dq1_lift = state.dq1_lift;
-    measurement.dq1_rotation = state.dq1_rotation;
-    measurement.dq2_lift = state.dq2_lift;
-    measurement.dq2_rotation = state.dq2_rotation;
+    status |= springline_measure(&controller, &state, &measurement);
     if (with_stack) paint();
     start = ticks();
     status |= springline_step(&controller, &reference, &measurement, &command, &diagnostics);
@@ -102,7 +101,7 @@ static int tick_is_right(void) {
 
 static void print(const char *name, const cost *speed, const cost *room) {
   printf("%-13s mean %6lu  most %6lu instructions   stack %4u bytes\n", name,
-         (unsigned long)(speed->total / (speed->count / INSTRUCTIONS_PER_TICK)),
+         (unsigned long)((uint64_t)speed->total * INSTRUCTIONS_PER_TICK / speed->count),
          (unsigned long)(speed->most * INSTRUCTIONS_PER_TICK), room->stack);
 }
 

@@ -23,7 +23,7 @@ import casadi as ca
 
 from springline.model.control.reaching import Law
 from springline.model.control.sliding import SurfaceExponents
-from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case
+from springline.model.declared import expect_names, expect_parameters, expect_text, is_number, snake_case
 from springline.model.dynamics import EquationsOfMotion
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.perturbation import slow_mass
@@ -168,6 +168,12 @@ def commanded(
     given = controller.control(r, y, states, model, p)
     if not isinstance(given, Control):
         raise ValueError(f"controller {controller.name}: control: expected a Control, got {type(given).__name__}")
+    for what, items in (("dz", {} if callable(given.dz) else given.dz), ("diagnostics", given.diagnostics)):
+        if not isinstance(items, Mapping):
+            raise ValueError(
+                f"controller {controller.name}: {what}: expected a dict of names and expressions, "
+                f"got {type(items).__name__}"
+            )
 
     def column(what: str, value: ca.SX, rows: int) -> ca.SX:
         shape = ca.SX(value).shape
@@ -231,5 +237,5 @@ def check_controller(controller: Controller) -> None:
         for item in declared:
             for text in (item.unit, item.meaning):
                 expect_text(owner, f"{what}, {item.name}", text)
-            if not math.isfinite(item.initial):
+            if not is_number(item.initial) or not math.isfinite(item.initial):
                 raise ValueError(f"{owner}: {what}, {item.name}: expected a finite initial value, got {item.initial!r}")

@@ -143,6 +143,7 @@ def check_law(law: Law) -> None:
     owner = f"law {type(law).__name__}"
     expect_names(owner, "name", [law.name])
     expect_text(owner, "title", law.title)
+    expect_text(owner, "equations", law.equations)
     expect_parameters(owner, "parameters", law.parameters, ())
     if any(item.per_joint for item in law.parameters):
         raise ValueError(f"{owner}: parameters: expected one number each, for rate is computed of a joint's sigma")

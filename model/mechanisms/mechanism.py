@@ -9,7 +9,15 @@ from typing import ClassVar, Literal
 
 import casadi as ca
 
-from springline.model.declared import expect_names, expect_parameters, expect_text, snake_case, symbols_of
+from springline.model.declared import (
+    expect_names,
+    expect_numbers,
+    expect_parameters,
+    expect_text,
+    is_number,
+    snake_case,
+    symbols_of,
+)
 from springline.model.mechanisms.body import Body, Solid, kinetic_energy_of, potential_energy_of, solid
 from springline.model.mechanisms.link import Link, Segment, bodies_of, segments_of
 from springline.model.parameters import POSITIVE, REAL, Joint, Parameter, Values
@@ -191,8 +199,10 @@ def check_mechanism(mechanism: Mechanism) -> None:
     taken = [name for name in names if name in TAKEN]
     if taken:
         raise ValueError(f"{owner}: parameters, motor_inertia and stiffness: {taken[0]!r} is a key of every mechanism")
-    if mechanism.limits and not (
-        len(mechanism.limits) == len(joints) and all(len(pair) == 2 and pair[0] < pair[1] for pair in mechanism.limits)
+    if mechanism.limits != () and not (
+        isinstance(mechanism.limits, tuple | list)
+        and len(mechanism.limits) == len(joints)
+        and all(_is_interval(pair) for pair in mechanism.limits)
     ):
         raise ValueError(f"{owner}: limits: expected () or a pair low < high per joint, got {mechanism.limits!r}")
     if "g" not in {item.name for item in mechanism.parameters}:
@@ -202,9 +212,23 @@ def check_mechanism(mechanism: Mechanism) -> None:
         entries = sum(len(joints) if item.per_joint else 1 for item in declared)
         if entries != len(joints):
             raise ValueError(f"{owner}: {what}: expected {len(joints)} numbers, one per joint, got {entries}")
-    for what in ("reference_offset", "start_position", "start_rate", "reference_terms"):
-        found = getattr(mechanism, what)
-        if len(found) != len(joints):
-            raise ValueError(f"{owner}: {what}: expected {len(joints)} entries, one per joint, got {len(found)}")
-        if what != "reference_terms" and not all(math.isfinite(value) for value in found):
-            raise ValueError(f"{owner}: {what}: expected finite numbers, got {found!r}")
+    for what in ("reference_offset", "start_position", "start_rate"):
+        expect_numbers(owner, what, getattr(mechanism, what), len(joints))
+    terms = mechanism.reference_terms
+    if not isinstance(terms, tuple | list) or len(terms) != len(joints) or not all(map(_are_terms, terms)):
+        raise ValueError(f"{owner}: reference_terms: expected a tuple of SineTerm for each joint, got {terms!r}")
+    if not isinstance(mechanism.control_defaults, Mapping):
+        raise ValueError(
+            f"{owner}: control_defaults: expected a dict of names and numbers, got {mechanism.control_defaults!r}"
+        )
+    for name, value in mechanism.control_defaults.items():
+        if not is_number(value):
+            expect_numbers(owner, f"control_defaults, {name}", value, len(joints))
+
+
+def _is_interval(pair: object) -> bool:
+    return isinstance(pair, tuple | list) and len(pair) == 2 and all(map(is_number, pair)) and pair[0] < pair[1]
+
+
+def _are_terms(terms: object) -> bool:
+    return isinstance(terms, tuple | list) and all(isinstance(term, SineTerm) for term in terms)

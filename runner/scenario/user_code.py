@@ -313,9 +313,9 @@ def told(users: Mapping[UserClass, str], where: str) -> Iterator[None]:
     """
     try:
         yield
-    except InputError:
+    except (InputError, KeyboardInterrupt):
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:  # a user's file may raise what it likes
         user = _blamed(error, users)
         if not (_lines(error, user) or isinstance(error, ValueError | RuntimeError)):
             raise  # no line of a user's, and nothing that we or CasADi say of what he gave: a fault of our own
@@ -338,7 +338,8 @@ def _blamed(error: BaseException, users: Mapping[UserClass, str]) -> UserClass:
 def _message(error: BaseException) -> str:
     """What went wrong, without the places in CasADi's sources that its messages begin with."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    told = [line for line in lines if not re.search(r"\.[ch]pp:\d+", line)] or lines
+    told = [line for line in lines if not re.search(r"\.[ch]pp:\d+", line)]
+    told = told or [re.sub(r"^.*\.[ch]pp:\d+:\s*", "", line) for line in lines]
     kind = type(error).__name__
     if isinstance(error, ValueError):
         return " ".join(told) or kind

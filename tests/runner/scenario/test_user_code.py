@@ -330,7 +330,8 @@ def test_a_law_that_varies_is_found_again(folder: Path) -> None:
 
 HEAD = (
     "import casadi as ca\n"
-    "from springline.model import Body, Control, Controller, Joint, Law, Link, Mechanism, Parameter\n"
+    "from springline.model import BaseMotion, Body, Control, Controller, Joint\n"
+    "from springline.model import Law, Link, Mechanism, Parameter, Quantity, section\n"
 )
 OF_ARM = (
     "class Bad(Mechanism):\n  joints = (Joint('a', 'm', 'N'),)\n  parameters = (Parameter('m', 'kg', 1.0, 'mass'), "
@@ -351,6 +352,9 @@ TWO = (
     .replace("'motor')", "'motor', per_joint=True)")
     .replace("'spring')", "'spring', per_joint=True)")
 )
+FULL = f"{OF_BODIES}  def bodies(self, q, p): return [Body(p.m, (q[0], 0, 0))]\n"
+CONTROL = "class Bad(Controller):\n  def control(self, r, y, z, model, p): "
+STATE = "class Bad(Controller):\n  states = (Quantity('s', 's', '1', 'state', initial='x'),)\n"
 
 
 @pytest.mark.parametrize(
@@ -359,10 +363,10 @@ TWO = (
         ("control.law", "class Good(Law):\n  def rate(self, sigma, p): return -sigma\n", "unknown class in bad.py"),
         ("control.law", "class Bad: pass\n", "expected a subclass of springline.model.Law"),
         ("control.law", "class Bad(Law): pass\n", "abstract method rate"),
-        ("control.law", "class Bad(Law:\n", "bad.py, line 3: invalid syntax"),
+        ("control.law", "class Bad(Law:\n", "bad.py, line 4: invalid syntax"),
         ("control.law", "x = '\0'\n", "bad.py"),
-        ("control.law", "import nothere\n", "No module named 'nothere' (bad.py, line 3"),
-        ("control.law", "import sys\nsys.exit(3)\n", "SystemExit: 3 (bad.py, line 4"),
+        ("control.law", "import nothere\n", "No module named 'nothere' (bad.py, line 4"),
+        ("control.law", "import sys\nsys.exit(3)\n", "SystemExit: 3 (bad.py, line 5"),
         ("control.law", f"{RATE}return -sigma * p.k9\n", "there is no 'k9' here, but k1,"),
         ("control.law", f"{RATE}return ca.vertcat(sigma, sigma)\n", "law bad: rate: expected a scalar, got 2 x 1"),
         ("control.law", f"{RATE}pass\n", "expected a CasADi SX expression, got NoneType"),
@@ -396,7 +400,7 @@ TWO = (
         ("mechanism.name", f"{OF_ARM}return p.m * ca.SX.sym('z') * dq**2\n", "kinetic_energy: depends on 'z'"),
         ("mechanism.name", f"{OF_ARM}return p.m * dq**2 * (1 + omega[0]**2)\n", "depends on the base's rate"),
         ("mechanism.name", f"{OF_ARM}return p.m * dq**3\n", "depends on the joint rates"),
-        ("mechanism.name", f"{OF_ARM}return p.m * ca.dot(dq, omega)\n", "dot: Dimension mismatch (bad.py, line 9"),
+        ("mechanism.name", f"{OF_ARM}return p.m * ca.dot(dq, omega)\n", "dot: Dimension mismatch (bad.py, line 10"),
         ("mechanism.name", f"{OF_ARM}return p.m * dq[1]**2\n", "out of bounds"),
         ("mechanism.name", f"{TWO}return p.m * ca.dot(dq, dq)\n", "two numbers would be called 'U_s_a'"),
         ("mechanism.name", f"{OF_ARM}return p.m * dq**2\n".replace("'g'", "'G'"), "expected one called g"),
@@ -406,6 +410,34 @@ TWO = (
         ("control.controller",
          "class Bad(Controller):\n  def control(self, r, y, z, model, p): return Control(r.q, r.q[0])\n",
          "error has shape 1 x 1, expected 2 x 1"),
+        ("control.law", "class Bad(Law):\n  def rate(self, sigma): return -sigma\n",
+         "Bad: expected rate(self, sigma, p), got rate(self, sigma)"),
+        ("control.law", f"class Bad(Law):\n  equations = '*/ int x;'\n{OF_LAW}", "law Bad: equations: expected"),
+        ("control.law", f"{RATE}\n    with section('a', '*/'): return -sigma\n",
+         "section: title and equations: expected a line of text without /* and */, got '*/' (bad.py, line 6"),
+        ("control.law", f"{RATE}return sigma if sigma > 0 else 0\n", "RuntimeError: Cannot compute the truth value"),
+        ("control.law", "class Odd(BaseException): pass\nraise Odd('so')\n", "Odd: so (bad.py, line 5"),
+        ("base_motion.kind", "class Bad(BaseMotion):\n  def motion(self, t): return (t,) * 6\n",
+         "Bad: expected motion(self, t, p), got motion(self, t)"),
+        ("mechanism.name", f"{FULL}  def tip(self, q): return q\n", "Bad: expected tip(self, q, p), got tip(self, q)"),
+        ("mechanism.name", f"{FULL}  tip = 5\n", "Bad: expected tip(self, q, p), got 5"),
+        ("mechanism.name", f"{FULL}  start_position = 0.3\n", "start_position: expected 1 entries, one per"),
+        ("mechanism.name", f"{FULL}  start_rate = ('a',)\n", "start_rate: expected finite numbers, got ('a',)"),
+        ("mechanism.name", f"{FULL}  limits = (0, 1)\n", "limits: expected () or a pair low < high per"),
+        ("mechanism.name", f"{FULL}  limits = (('a', 'b'),)\n", "limits: expected () or a pair low < high per"),
+        ("mechanism.name", f"{FULL}  reference_terms = ((1, 2),)\n", "reference_terms: expected a tuple of SineTerm"),
+        ("mechanism.name", f"{FULL}  control_defaults = 5\n", "control_defaults: expected a dict of names and numbers"),
+        ("mechanism.name", f"{FULL}  control_defaults = {{'mu': (1, 2)}}\n", "control_defaults, mu: expected 1"),
+        ("control.controller", f"{CONTROL}return Control(r.q, r.q, [r.q])\n",
+         "controller bad: dz: expected a dict of names and expressions, got list"),
+        ("control.controller", f"{CONTROL}return Control(r.q, r.q, {{}}, 3)\n",
+         "controller bad: diagnostics: expected a dict of names and expressions, got int"),
+        ("control.controller", f"{CONTROL}return Control(r.q + ca.SX.sym('h'), r.q)\n",
+         "controller bad: control: depends on 'h', which it was not given"),
+        ("control.controller", f"{CONTROL}return Control(r.q + float(y.q1[0]), r.q)\n",
+         "controller bad: control: contains NaN, which float() and the functions of math make of an expression"),
+        ("control.controller", f"{STATE}{CONTROL[CONTROL.index('  def'):]}return Control(r.q, r.q, {{'s': r.q}})\n",
+         "states, s: expected a finite initial value, got 'x'"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_file_class_and_lines(tmp_path: Path, door: str, text: str, expected: str) -> None:
@@ -446,6 +478,15 @@ def test_a_table_of_a_law_that_is_not_chosen_is_an_unknown_key(folder: Path) -> 
     (folder / "bad.toml").write_text('[control]\nlaw = "law.py:Smooth"\nsmooth = { gian = 2.0 }\n')
     with pytest.raises(InputError, match=r"control\.smooth\.gian: unknown key.*did you mean 'gain'"):
         load_scenario(folder / "bad.toml")
+
+
+def test_a_law_may_ask_for_the_same_always(folder: Path) -> None:
+    """A number is an expression too."""
+    (folder / "law.py").write_text(f"from springline.model import Law\n{RATE}return -1.5\n")
+    system = load_scenario("paper/nominal", {"control.law": f"{folder / 'law.py'}:Bad"}).system()
+    (name,) = (name for name in system.functions if name == "law_bad")
+    values = [slot.default for slot in system.slots]
+    assert float(system.function(name)(0.3, values)) == -1.5
 
 
 def test_a_fault_of_our_own_is_none_of_the_user_s(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from arms import structure_of, values_of
+from chains import chain, numbers_for
 from printed import with_whole_comments
 
 from springline.codegen.elementary import math_header
@@ -23,7 +25,9 @@ from springline.codegen.export.c.model import model_files
 from springline.codegen.kernel import toolchain
 from springline.model import Law, Parameter, Structure, System
 from springline.model.control import LAWS
+from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import Values
+from springline.model.structure import SignalShape
 from springline.model.terms import Term, named, noted, of_joint, section
 from springline.runner.scenario import load_scenario
 
@@ -112,6 +116,31 @@ def test_what_comes_from_several_says_how_to_the_last_bit() -> None:
     for _, value, formula in found:
         python = re.sub(r"(?<=[\w)]) (?=[\w(])", " * ", formula).replace("^", "**")
         assert eval(python, {}, values) == value, formula  # noqa: S307 - our own text
+
+
+def test_what_is_too_long_for_a_formula_names_the_parameters_it_comes_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two links in space, whose frames are parameters: a constant says in a few lines what changes it."""
+    arm = chain("rr")
+    monkeypatch.setitem(MECHANISMS, "frames", arm)
+    structure = structure_of("frames", reference=SignalShape("sine", (0, 0)))
+    numbers = numbers_for(2, np.random.default_rng(3))
+    others = {f"{table}.{name}": value for name, value in numbers.items() for table in ("plant", "mechanism")}
+
+    def exported(values: dict[str, float]) -> dict[str, tuple[float, str]]:
+        text = generate_files(bind(structure, values_of(structure, values)))[0]["src/springline.c"].decode()
+        bodies = text.split("\nstatic ")
+        return {f"{k} {name}": (value, told) for k, body in enumerate(bodies) for name, value, told in constants(body)}
+
+    found = exported(others)
+    assert max(len(told) for _, told in found.values()) <= 150
+    changed = exported(others | {"plant.u1x": others["plant.u1x"] * 1.5})
+    assert found.keys() == changed.keys()
+    moved = {name for name in found if found[name][0] != changed[name][0]}
+    named = {name for name, (_, told) in found.items() if "plant_u1x" in told or name.endswith(" plant_u1x")}
+    several = {name for name, (_, told) in found.items() if re.match(r"from .* and \d+ more$", told)}
+    told = [told for _, told in found.values() if told.startswith("from plant_") and " more" not in told]
+    assert told and len(several) > 5
+    assert len(moved) > 5 and named <= moved <= named | several
 
 
 @pytest.mark.parametrize("tunable", [(), "all"])
