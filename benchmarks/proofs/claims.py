@@ -34,10 +34,10 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Reduction:
-    """r = a - b with a = x - n C1 and b = n C2, of x = n (C1 + C2 + rest) + R; n = x times a number, rounded.
+    """r = a - b with a = x - n C1 and b = n C2, of x = n (C1 + C2 + beyond) + R; n = x times a number, rounded.
 
     function whose it is
-    period   bounds of C1 + C2 + rest
+    period   bounds of C1 + C2 + beyond
     smallest |x| below which n is 0
     largest  |x|
     reach    of r and R
@@ -52,7 +52,7 @@ class Reduction:
     most: int
 
     def parts(self, program: Program) -> tuple[int, int, Bounds]:
-        """The steps a and b, and bounds of `rest`."""
+        """The steps a and b, and bounds of `beyond`."""
         a, b = program.arguments(program.place("r"), Op.SUB)
         first, second = (self._constant(program, each) for each in (program.arguments(a, Op.SUB)[1], b))
         return a, b, (self.period[0] - first - second, self.period[1] - first - second)
@@ -63,9 +63,9 @@ class Reduction:
             raise UnprovedError(f"{program.name(product)} is not a multiple of n")
         return Fraction(program.steps[constant].number)
 
-    def theorems(self, program: Program, goals: tuple[str, ...]) -> Iterator[Theorem]:
-        """That n is 0 for small arguments, and else the goals: about r, a, b, n and R; M is R without n rest."""
-        a, b, rest = self.parts(program)
+    def theorems(self, program: Program, last: str, goals: tuple[str, ...]) -> Iterator[Theorem]:
+        """That n is 0 for small arguments, and else the goals: about steps up to the last, and M = R + n beyond."""
+        a, b, beyond = self.parts(program)
         x, n1 = program.arguments(a, Op.SUB)
         t, shift = program.arguments(program.place("n"), Op.SUB)
         turns, again = program.arguments(t, Op.ADD)
@@ -85,20 +85,20 @@ class Reduction:
         start = DOUBLE, "x = rnd(any);"
         yield Theorem(
             f"{self.function}-reduction-small",
-            (*start, *program.lines(program.place("n"), {0: "x"})),
+            (*start, *program.lines({0: "x"}, program.place("n"))),
             (within("x", self.smallest),),
             ("n in [0,0]",),
         )
-        lines = (*start, *program.lines(program.place("r"), {0: "x"}))
+        lines = (*start, *program.lines({0: "x"}, program.place("r"), program.place(last)))
         yield Theorem(
             f"{self.function}-reduction",
-            (*lines, f"M = (x - n * {c1}) - n * {c2};", "R = M - n * rest;"),
-            (f"|x| in {between(self.smallest, self.largest)}", f"rest in {between(*rest)}"),
+            (*lines, f"M = (x - n * {c1}) - n * {c2};", "R = M - n * beyond;"),
+            (f"|x| in {between(self.smallest, self.largest)}", f"beyond in {between(*beyond)}"),
             (within("R", self.reach), within("n", self.most), *goals),
             (
                 f"x - n * {c1} -> -(n - (t - {k})) / {c0} - (t - ({turns_} + {k})) / {c0}"
                 f" - ({turns_} - x * {c0}) / {c0} + n * (1 / {c0} - {c1});",
                 f"{a_} - {b_} - M -> ({a_} - (x - {n1_})) - ({n1_} - n * {c1}) - ({b_} - n * {c2});",
-                f"r - R -> (r - ({a_} - {b_})) + ({a_} - {b_} - M) + n * rest;",
+                f"r - R -> (r - ({a_} - {b_})) + ({a_} - {b_} - M) + n * beyond;",
             ),
         )

@@ -31,7 +31,7 @@ def claims(procedure: Procedure) -> Iterator[Claim]:
     """For ordinary results, and for those next to denormal ones, where the product with s is rounded more coarsely."""
     program = Program(procedure)
     root = _scale(program)
-    reduction = (*REDUCTION.theorems(program, (within("r", REDUCTION.reach), within("r - R", ERROR_OF_R))),)
+    reduction = (*REDUCTION.theorems(program, "r", (within("r", REDUCTION.reach), within("r - R", ERROR_OF_R))),)
     # n = 2k or 2k + 1; from -706 on, k is -1019 at least.
     for case, bound, exponents in (
         (Case("exp", "-706 .. 708", uniform(-706.0, 708.0), mpmath.exp), Fraction("1.51"), (None,)),
@@ -77,8 +77,8 @@ def _evaluated(program: Program, root: float, k: int | None, bound: Fraction) ->
         lines = [
             DOUBLE,
             "r = rnd(any);",
-            *program.lines(q, {r: "r"}),
-            *program.lines(q, {r: "R"}, prefix="m_", rounding=""),
+            *program.lines({r: "r"}, q),
+            *program.lines({r: "R"}, q, prefix="m_", rounding=""),
         ]
         known = [
             f"R in {between(*range_of_r)}",

@@ -68,9 +68,9 @@ class Program:
             raise ValueError(f"{self.name(place)} is {self.steps[place]}, not one of {ops}")
         return self.steps[place].arguments
 
-    def _needed(self, place: int, given: Mapping[int, object]) -> list[int]:
+    def _needed(self, given: Mapping[int, object], *places: int) -> list[int]:
         found: set[int] = set()
-        waiting = [place]
+        waiting = [*places]
         while waiting:
             each = waiting.pop()
             if each not in found and each not in given:
@@ -78,14 +78,14 @@ class Program:
                 waiting += self.steps[each].arguments
         return sorted(found)
 
-    def lines(self, place: int, given: Mapping[int, str], prefix: str = "", rounding: str = "rnd") -> Iterator[str]:
-        """Statements up to a step, in Gappa's language, from steps whose names are given.
+    def lines(self, given: Mapping[int, str], *places: int, prefix: str = "", rounding: str = "rnd") -> Iterator[str]:
+        """Statements up to some steps, in Gappa's language, from steps whose names are given.
 
         prefix    before the names of steps; constants have none
         rounding  the operator of each operation; "" for the arithmetic of real numbers
         """
         names = dict(given)
-        for each in self._needed(place, given):
+        for each in self._needed(given, *places):
             step = self.steps[each]
             if step.op is Op.REAL_CONSTANT:
                 names[each] = number(step.number)
@@ -102,7 +102,7 @@ class Program:
     def polynomial(self, place: int, given: Mapping[int, Polynomial]) -> Polynomial:
         """A step without rounding, as a polynomial, from steps that are given."""
         values = dict(given)
-        for each in self._needed(place, given):
+        for each in self._needed(given, place):
             step = self.steps[each]
             a = [values[argument] for argument in step.arguments]
             match step.op:
@@ -132,7 +132,7 @@ class Program:
     def value(self, place: int, given: Mapping[int, float]) -> float | int:
         """What a step gives in double precision, or its bits, from steps that are given."""
         values: dict[int, float | int] = dict(given)
-        for each in self._needed(place, given):
+        for each in self._needed(given, place):
             step = self.steps[each]
             if step.op in _CONSTANTS:
                 values[each] = step.number

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -15,7 +16,7 @@ from springline.benchmarks.proofs.claims import UnprovedError
 from springline.benchmarks.proofs.functions import FUNCTIONS
 from springline.benchmarks.proofs.gappa import PACKAGE, Theorem, number, objection
 from springline.benchmarks.proofs.polynomials import HALF_PI, LN2, Polynomial
-from springline.codegen.elementary import Op, Procedure, coefficients, procedure
+from springline.codegen.elementary import Op, Procedure, procedure
 
 Require = Callable[..., str]
 
@@ -29,8 +30,10 @@ def theorems(program: Procedure, function: str) -> list[Theorem]:
 
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_gappa_proves_what_is_claimed(function: str, require_tool: Require, tmp_path: Path) -> None:
+    """Of the many theorems on sine one in twelve; `make prove` proves them all."""
     require_tool(PACKAGE)
-    for theorem in theorems(procedure(function), function):
+    chosen = theorems(procedure(function), function)
+    for theorem in chosen if len(chosen) < 20 else [chosen[-1], *chosen[:4], *chosen[4::12]]:
         assert objection(theorem, tmp_path) == ""
 
 
@@ -46,19 +49,24 @@ def changed(function: str, old: float, new: float) -> Procedure:
 
 
 WRONG = {
-    "low bits of a coefficient": ("exp", coefficients.EXP[1], coefficients.EXP[1] * (1 + 2.0**-43)),
-    "last coefficient left out": ("exp", coefficients.EXP[-1], 0.0),
-    "one part of ln 2": ("exp", float.fromhex("0x1.ef35793c7673p-46"), 0.0),
-    "first part of ln 2 too long": ("exp", float.fromhex("0x1.62e42fefa38p-2"), math.log(2) / 2),
+    "low bits of a coefficient": ("exp", "exp-odd", "0x1.555555555589dp-3", "0x1.5555555555a9dp-3"),
+    "last coefficient left out": ("exp", "exp-odd", "0x1.71a9f807860fep-19", "0"),
+    "one part of ln 2": ("exp", "exp-reduction", "0x1.ef35793c7673p-46", "0"),
+    "first part of ln 2 too long": ("exp", "exp-reduction", "0x1.62e42fefa38p-2", "0x1.62e42fefa39efp-2"),
+    "third part of pi/2 too short": ("sincos", "sincos-reduction", "0x1.98a2e03707345p-77", "0x1.98a2ep-77"),
+    "low bits of a sine's coefficient": ("sincos", "sincos-sine-0", "-0x1.5555555555548p-3", "-0x1.5555555555508p-3"),
+    "low bits of a cosine's coefficient": ("sincos", "sincos-cosine", "0x1.555555555554bp-5", "0x1.555555555514bp-5"),
 }
+"""What is wrong: the function, the theorem that fails, a constant and what it is changed to."""
 
 
 @pytest.mark.parametrize("what", WRONG)
 def test_a_wrong_constant_is_not_proved(what: str, require_tool: Require, tmp_path: Path) -> None:
     require_tool(PACKAGE)
-    function, old, new = WRONG[what]
-    objections = [objection(each, tmp_path) for each in theorems(changed(function, old, new), function)]
-    assert any("some properties were not satisfied" in each for each in objections)
+    function, name, old, new = WRONG[what]
+    program = changed(function, float.fromhex(old), float.fromhex(new))
+    (theorem,) = (each for each in theorems(program, function) if each.name == name)
+    assert re.search("Error: (some properties were not satisfied|no contradiction)", objection(theorem, tmp_path))
 
 
 def test_a_wrong_root_of_two_is_seen_before_gappa() -> None:
