@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from springline.benchmarks.math_accuracy import measure
@@ -25,16 +26,16 @@ def proved(name: str, folder: Path, samples: int) -> list[str]:
         claims = [*FUNCTIONS[name](procedure(name))]
     except UnprovedError as error:
         return [f"{name}: {error}"]
-    objections = []
+    theorems = {theorem.name: theorem for claim in claims for theorem in claim.theorems}  # claims share some
+    with ThreadPoolExecutor() as pool:
+        said = dict(zip(theorems, pool.map(lambda each: objection(each, folder), theorems.values()), strict=True))
     rows = measure(samples, 1, tuple(claim.case for claim in claims))
     for claim, row in zip(claims, rows, strict=True):
-        against = [text for theorem in claim.theorems if (text := objection(theorem, folder))]
-        bound = "no" if against else f"{float(claim.bound):.2f}"
+        bound = "no" if any(said[theorem.name] for theorem in claim.theorems) else f"{float(claim.bound):.2f}"
         case = claim.case
         sys.stdout.write(ROW.format(case.function, case.range, len(claim.theorems), bound, f"{row.error:.2f}"))
         sys.stdout.flush()
-        objections += against
-    return objections
+    return [text for text in said.values() if text]
 
 
 def main() -> int:
