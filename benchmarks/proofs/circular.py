@@ -92,9 +92,9 @@ def _sines(program: Program, d: Fraction) -> Iterator[Theorem]:
     it, with no d; where x is less than the least R that other n have, its cube is too small to change it.
     """
     s, r, rest = (program.place(name) for name in ("s", "r", "rest"))
-    first, u = program.arguments(s, Op.SUB)
+    minuend, u = program.arguments(s, Op.SUB)
     again, w = program.arguments(u, Op.SUB)
-    if (first, again) != (r, rest):
+    if (minuend, again) != (r, rest):
         raise UnprovedError("the sine is not r - (rest - w)")
     least = Fraction(min(_distances()), 2**BITS)
     u_, w_ = program.name(u), program.name(w)
