@@ -13,7 +13,7 @@ PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-bui
 SHIPPED = $(shell find springline model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format docs-tables docs-pictures math-accuracy firmware bench docs-bench clean FORCE
+.PHONY: help install reproduce test test-full lint format docs-tables docs-pictures math-accuracy prove firmware bench docs-bench clean FORCE
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -48,6 +48,9 @@ docs-pictures: .venv/installed ## draw the pictures of docs/architecture.md and 
 
 math-accuracy: .venv/installed ## measure the elementary functions against mpmath; writes the table in docs/math.md
 	$(BIN)/python -m benchmarks.math_accuracy --write
+
+prove: .venv/installed ## have Gappa prove the rounding errors of elementary functions, for what stands in docs/math.md
+	$(BIN)/python -m benchmarks.proofs
 
 firmware: .venv/installed ## the controller on two microcontrollers under emulation: bits, instructions, stack, flash
 	$(MAKE) -C examples/cortex_m firmware SPRINGLINE=$(abspath $(BIN))/springline

@@ -1,0 +1,1 @@
+"""Proofs of the rounding errors of the elementary functions."""
