@@ -99,7 +99,7 @@ def own_control_tables(structure: Structure) -> dict[str, tuple[Parameter, ...]]
     law = LAWS[structure.law]
     owners: list[Controller | Law] = [controller] if LAWS.is_packaged(structure.law) else [controller, law]
     return {
-        item.name: tuple(mechanism.fitted(parameter) for parameter in item.parameters)
+        item.name: tuple(mechanism.fitted(parameter, item.name) for parameter in item.parameters)
         for item in owners
         if item.parameters
     }
@@ -350,6 +350,21 @@ class System:
         """
         for p in (self._nominal, self._plant):
             expect_plausible(self.mechanism, p, self.p, q, values)
+
+    @derivation
+    def unmet(self, values: np.ndarray) -> tuple[str, ...]:
+        """Sentences on gains, in the parameter vector p, that are less than what the controller's theory asks for."""
+        owner = self.controller
+        found = []
+        for item in owner.conditions(self._control):
+            pair = ca.Function("pair", [self.p], [ca.densify(item.value), ca.densify(item.least)])(values)
+            gains, least = (np.array(side).ravel() for side in pair)
+            for i, (gain, bound) in enumerate(zip(gains, np.broadcast_to(least, gains.shape), strict=True)):
+                if not gain > bound:
+                    key = f"control.{owner.name}.{item.gain}" + (f".{i}" if gains.size > 1 else "")
+                    text = f"expected > {item.relation} = {bound:.6g}, or {item.effect} does not follow from"
+                    found.append(f"{key} is {gain:.6g}: {text} {item.theorem}")
+        return tuple(found)
 
     def terms(self, name: str) -> tuple[Term, ...]:
         """What the model calls the parts of Function `name`; they are the outputs of Function `name`_terms."""

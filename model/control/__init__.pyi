@@ -2,6 +2,7 @@ from .common import K_F as K_F
 from .common import U_MAX as U_MAX
 from .common import fast_control as fast_control
 from .controller import ArmModel as ArmModel
+from .controller import Condition as Condition
 from .controller import Control as Control
 from .controller import ControlSignals as ControlSignals
 from .controller import Controller as Controller

@@ -80,6 +80,23 @@ class Control:
     a_law: ca.SX | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """What a theorem asks of a gain: that it be greater than something. Where it is not, the user is warned.
+
+    gain     the parameter;  value: it, a scalar or n x 1
+    least    what it must exceed, likewise;  relation: that as a formula, for people
+    theorem  for people;  effect: what does not follow from it otherwise
+    """
+
+    gain: str
+    value: ca.SX
+    least: ca.SX
+    relation: str
+    theorem: str
+    effect: str
+
+
 class Controller(ABC):
     """A controller. A subclass says at least how it computes the command.
 
@@ -118,6 +135,10 @@ class Controller(ABC):
     def update(self, r: Values, y: Values, z: Values, model: ArmModel, p: Values, h: ca.SX) -> Rates | None:
         """The states one sample of h seconds later, where the control is sampled; None for an explicit Euler step."""
         return None
+
+    def conditions(self, p: Values) -> Sequence[Condition]:
+        """What its theory asks of its gains."""
+        return ()
 
 
 @dataclass(frozen=True, slots=True)

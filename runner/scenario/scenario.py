@@ -190,6 +190,11 @@ class Scenario:
         shape = _shape(table, [c.key for c in COORDINATES])
         return replace(shape, terms=shortest(shape.terms))
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the theory of its controller does not cover, a sentence each, for people."""
+        return self.system().unmet(self.values())
+
     def system(self) -> System:
         """The System of the structure; the same object for equal structures."""
         return system_of(self.structure())
