@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from springline.model.base import BaseCoordinate, moving
-from springline.model.control import LogForm, SurfaceExponents
+from springline.model.control import LogForm, ObserverInput, SurfaceExponents
 from springline.model.drive import DriveKind
 
 SignalKind = Literal["none", "sine", "polynomial", "table", "own", "input"]
@@ -35,6 +35,7 @@ class Structure:
 
     size           how many joints a mechanism has that comes in several sizes, 0 for as many as it has
     controller     by name; law, log_form and exponents are those of one that has a reaching law
+    observer       of disturbances, by name;  observer_input: what drives it
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
     effects        properties of sensors and motors, by name, in the order in which they act
     disturbance    forces on the links, per joint; not even zero where its kind is "none"
@@ -62,6 +63,8 @@ class Structure:
     mount_rpy: bool = False
     friction: tuple[str, ...] = ()
     disturbance: SignalShape = SignalShape()
+    observer: str = "none"
+    observer_input: ObserverInput = "command"
 
     @property
     def base_coordinates(self) -> tuple[BaseCoordinate, ...]:

@@ -24,12 +24,16 @@ from springline.model.control import (
     CONTROLLERS,
     K_F,
     LAWS,
+    OBSERVERS,
     SURFACE_PARAMETERS,
     U_MAX,
     ArmModel,
+    Condition,
     Controller,
     ControlSignals,
     Law,
+    Observer,
+    Observing,
     commanded,
     fast_control,
 )
@@ -42,6 +46,7 @@ from springline.model.drive import (
     diagonal,
     friction,
     friction_parameters,
+    spring_force,
     static_motor_position,
 )
 from springline.model.dynamics import EquationsOfMotion, equations_of_motion
@@ -76,7 +81,7 @@ from springline.model.quantities import (
 from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
 from springline.model.symbolic import as_written, associated, derivation, derived_property, without
-from springline.model.terms import Term, noted
+from springline.model.terms import Term, named, noted, section
 from springline.model.tip import tip_motion
 
 
@@ -93,11 +98,12 @@ def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tu
 
 
 def own_control_tables(structure: Structure) -> dict[str, tuple[Parameter, ...]]:
-    """Tables [control.<name>] of a structure: the parameters of its controller, and of a law that is a user's own."""
+    """Tables [control.<name>] of a structure: of its controller, its observer, and a law that is a user's own."""
     mechanism = MECHANISMS[structure.mechanism].of_size(structure.size)
     controller = CONTROLLERS[structure.controller]
     law = LAWS[structure.law]
-    owners: list[Controller | Law] = [controller] if LAWS.is_packaged(structure.law) else [controller, law]
+    owners: list[Controller | Law | Observer] = [controller, OBSERVERS[structure.observer]]
+    owners += [] if LAWS.is_packaged(structure.law) else [law]
     return {
         item.name: tuple(mechanism.fitted(parameter, item.name) for parameter in item.parameters)
         for item in owners
@@ -138,6 +144,9 @@ class System:
         self.drive: Drive = DRIVES[self.structure.drive]
         law = LAWS[self.structure.law].with_form(self.structure.log_form)
         self.controller: Controller = CONTROLLERS[self.structure.controller].with_law(law, self.structure.exponents)
+        self.observer: Observer | None = None
+        if self.structure.observer != "none":
+            self.observer = OBSERVERS[self.structure.observer].driven_by(self.structure.observer_input)
         self.tableau: Tableau = INTEGRATORS[self.structure.integrator]
         self.joints: tuple[Joint, ...] = self.mechanism.joints
         self.n = n = len(self.joints)
@@ -151,8 +160,12 @@ class System:
         self._plant = vector.table("plant", (*arm, *drive), self.joints)
         control_table = control_parameters(self.mechanism, self.structure.drive)
         self._control = vector.table("control", control_table, self.joints)
-        for table, own in own_control_tables(self.structure).items():
-            self._control |= vector.table(f"control.{table}", own, self.joints)
+        tables = own_control_tables(self.structure).items()
+        own = {table: vector.table(f"control.{table}", declared, self.joints) for table, declared in tables}
+        # What an observer calls its parameters is no concern of the controller's, nor the other way round.
+        self._observing = self._control | (own.pop(self.observer.name, Values({})) if self.observer else Values({}))
+        for values in own.values():
+            self._control |= values
 
         self.t = ca.SX.sym("t")
         symbols = SignalSymbols(self.t, vector)
@@ -262,7 +275,8 @@ class System:
     @property
     def controller_states(self) -> tuple[Quantity, ...]:
         """What z consists of, by the names of its columns."""
-        return tuple(replace(state, name=f"z_{state.name}") for state in self.controller.states)
+        states = (*self.controller.states, *(self.observer.states if self.observer else ()))
+        return tuple(replace(state, name=f"z_{state.name}") for state in states)
 
     @property
     def memory(self) -> tuple[Entry, ...]:
@@ -354,9 +368,12 @@ class System:
     @derivation
     def unmet(self, values: np.ndarray) -> tuple[str, ...]:
         """Sentences on gains, in the parameter vector p, that are less than what the controller's theory asks for."""
-        owner = self.controller
+        owners: list[tuple[Controller | Observer, Condition]]
+        owners = [(self.controller, item) for item in self.controller.conditions(self._control)]
+        if self.observer:
+            owners += [(self.observer, item) for item in self.observer.conditions(self._observing)]
         found = []
-        for item in owner.conditions(self._control):
+        for owner, item in owners:
             pair = ca.Function("pair", [self.p], [ca.densify(item.value), ca.densify(item.least)])(values)
             gains, least = (np.array(side).ravel() for side in pair)
             for i, (gain, bound) in enumerate(zip(gains, np.broadcast_to(least, gains.shape), strict=True)):
@@ -392,16 +409,26 @@ class System:
 
     def _signals_of_control(self) -> ControlSignals:
         nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal, self.arm.form)
-        return commanded(
-            self.controller,
-            self.joints,
-            Values({"q": self.q1d, "dq": self.dq1d, "ddq": self.ddq1d}),
-            Values({item.name: symbol for item, symbol in self._state.items()}),
-            self.z,
-            ArmModel(nominal, self.q1, self.dq1, diagonal(self.mechanism.motor_inertia, self._nominal)),
-            self._control,
-            self.h,
-        )
+        model = ArmModel(nominal, self.q1, self.dq1, diagonal(self.mechanism.motor_inertia, self._nominal))
+        y = Values({item.name: symbol for item, symbol in self._state.items()})
+        own = len(entries(self.controller.states, self.joints))
+        z, z_observer = ca.vertsplit(self.z, [0, own, self.z.numel()])
+        ddq = self.ddq1d
+        observing = None
+        if self.observer:
+            observing = Observing(self.observer, self.joints, y, z_observer, model, self._observing)
+            with section("what the observer has found", "docs/controllers.md 4"):
+                ddq = named("ddq_d", ddq - named("d", observing.d))
+        r = Values({"q": self.q1d, "dq": self.dq1d, "ddq": ddq})
+        signals = commanded(self.controller, self.joints, r, y, z, model, self._control, self.h)
+        if observing is None:
+            return signals
+        force = signals.command
+        if self.structure.observer_input == "spring":
+            force = spring_force(y.q1, y.q2, diagonal(self.mechanism.stiffness, self._nominal))
+        rates = observing.rates(force)
+        ahead = z_observer + self.h * rates
+        return replace(signals, dz=ca.vertcat(signals.dz, rates), ahead=ca.vertcat(signals.ahead, ahead))
 
     def _function(
         self, name: str, inputs: list[ca.SX], outputs: list[ca.SX], names_in: list[str], names_out: list[str]
@@ -428,7 +455,7 @@ class System:
         plant_in, plant_names = [*base_in, *force_in, x, self.u], [*base_names, *force_names, "x", "u"]
         slow_args, slow_names = [*base_in, q1, dq1, u_slow], [*base_names, "q1", "dq1", "u_s"]
         slow = perturbation.slow_dynamics(u_slow, real.disturbance, real, m2)
-        z_in, z_names = ([self.z], ["z"]) if self.controller.states else ([], [])
+        z_in, z_names = ([self.z], ["z"]) if self.memory else ([], [])
         parts, part_names = list(seen.parts.values()), [item.name.lower() for item in seen.parts]
         sigma_out, sigma_names = ([seen.sigma], ["sigma"]) if self.sliding else ([], [])
         result = {
@@ -464,7 +491,7 @@ class System:
         )
         result |= self._named("control", ins, [term.value for term in self._terms["control"]], names)
         result |= self._named("plant", plant_in, [term.value for term in self._terms["plant"]], plant_names)
-        if self.controller.states:
+        if self.memory:
             result |= {
                 **function("rates", ins, [seen.dz], names, ["dz"]),
                 **function("update", [*ins, self.h], [seen.ahead], [*names, "h"], ["z_next"]),
@@ -487,7 +514,7 @@ class System:
     def _loop(self, real: EquationsOfMotion, commanded: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
         """What the simulation loop consists of."""
         w, x, function = self.w, self.x, self._function
-        z_in, z_names = ([self.z], ["z"]) if self.controller.states else ([], [])
+        z_in, z_names = ([self.z], ["z"]) if self.memory else ([], [])
         ins, names = [w, x, *z_in], ["w", "x", *z_names]
         y = ca.vertcat(*sensed(self.structure.effects, self._state).values())
         seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished, commanded.a_law]
@@ -509,7 +536,7 @@ class System:
         if self.tip is not None:
             at = ca.substitute(self.tip, w, self._signal_expressions)
             result |= function("loop_tip", [self.t, self.d, x], [at], ["t", "d", "x"], ["tip"])
-        if self.controller.states:
+        if self.memory:
             result |= {
                 **function("loop_rates", ins, later[:1], names, ["dz"]),
                 **function("loop_update", [*ins, self.h], later[1:], [*names, "h"], ["z_next"]),

@@ -19,7 +19,7 @@ from springline.codegen.numbers import doubles
 from springline.codegen.program import program
 from springline.model.base import COORDINATES, shortest
 from springline.model.base_motion import MOTIONS, moving_terms
-from springline.model.control import CONTROLLERS, LAWS, LogForm, SurfaceExponents
+from springline.model.control import CONTROLLERS, INPUT, LAWS, OBSERVERS, LogForm, ObserverInput, SurfaceExponents
 from springline.model.drive import DRIVES, FRICTION, DriveKind
 from springline.model.mechanisms import MECHANISMS
 from springline.model.structure import MotorStart, SignalKind, SignalShape, Structure
@@ -162,6 +162,8 @@ class Scenario:
             mechanism=mechanism,
             law=self.registered(control["law"]),
             controller=self.registered(control["controller"]),
+            observer=self.registered(control["observer"]),
+            observer_input=cast(ObserverInput, self._observer_input),
             log_form=cast(LogForm, control["log_form"]),
             exponents=SurfaceExponents(**{name: control[name] for name in ("l", "m", "p", "r")}),
             reference=_shape(self.document["reference"], joints),
@@ -181,6 +183,12 @@ class Scenario:
         """Whether a damping or friction is not zero, in the plant or in what the controller believes of it."""
         given = (self.document["drive"].get(name), self.document["plant"].get(name))
         return any(number for value in given for _, number in flat(value) if not isinstance(value, dict))
+
+    @property
+    def _observer_input(self) -> str:
+        """What drives the observer; what there is no choice of is the first of its inputs."""
+        observer = OBSERVERS[self.registered(self.document["control"]["observer"])]
+        return str(self.document["control"].get(observer.name, {}).get(INPUT, observer.inputs[0]))
 
     def _base_motion(self) -> SignalShape:
         table = self.document["base_motion"]
@@ -444,7 +452,7 @@ class Scenario:
                 document[table] = {"kind": kind} | stays
         if overrides.get("control.mode") == "continuous":
             document["control"].pop("period", None)
-        for name, registry in (("controller", CONTROLLERS), ("law", LAWS)):
+        for name, registry in (("controller", CONTROLLERS), ("law", LAWS), ("observer", OBSERVERS)):
             old = document["control"][name]
             if overrides.get(f"control.{name}", old) != old:
                 document["control"].pop(registry[self.registered(old)].name, None)
@@ -459,7 +467,12 @@ class Scenario:
         elif drive in DRIVES and drive != document["drive"]["kind"]:
             structure = self.structure()
             shape = schema.schema(
-                structure.mechanism, cast(DriveKind, drive), structure.controller, structure.law, structure.size
+                structure.mechanism,
+                cast(DriveKind, drive),
+                structure.controller,
+                structure.law,
+                structure.size,
+                observer=structure.observer,
             )
             sections = {name: shape.sections[name] for name in ("plant", "control", "initial")}
             for name, section in (sections | {"drive": shape.kinds["drive"][str(drive)]}).items():
