@@ -80,7 +80,7 @@ from springline.model.quantities import (
 )
 from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
-from springline.model.symbolic import as_written, associated, derivation, derived_property, without
+from springline.model.symbolic import as_written, associated, derivation, derived_property, solve_spd, without
 from springline.model.terms import Term, named, noted, section
 from springline.model.tip import tip_motion
 
@@ -279,6 +279,15 @@ class System:
         return tuple(replace(state, name=f"z_{state.name}") for state in states)
 
     @property
+    def measured_base(self) -> tuple[Quantity, ...]:
+        """The base's motion as the controller is told of it, where it is."""
+        if self.structure.feedforward == "none":
+            return ()
+        return tuple(
+            replace(item, name=f"measured_{item.name}", meaning=f"measured {item.meaning}") for item in self.base_motion
+        )
+
+    @property
     def memory(self) -> tuple[Entry, ...]:
         """The entries of z."""
         return entries(self.controller_states, self.joints)
@@ -415,6 +424,9 @@ class System:
         z, z_observer = ca.vertsplit(self.z, [0, own, self.z.numel()])
         ddq = self.ddq1d
         observing = None
+        if self.measured_base:
+            with section("what the moving base does", "docs/controllers.md 5"):
+                ddq = named("ddq_fed", ddq - named("ddq_base", solve_spd(model(y.q1, y.dq1).H, nominal.disturbance)))
         if self.observer:
             observing = Observing(self.observer, self.joints, y, z_observer, model, self._observing)
             with section("what the observer has found", "docs/controllers.md 4"):
@@ -426,6 +438,8 @@ class System:
         force = signals.command
         if self.structure.observer_input == "spring":
             force = spring_force(y.q1, y.q2, diagonal(self.mechanism.stiffness, self._nominal))
+        if self.measured_base:  # which is no disturbance any more
+            force = force + nominal.disturbance
         rates = observing.rates(force)
         ahead = z_observer + self.h * rates
         return replace(signals, dz=ca.vertcat(signals.dz, rates), ahead=ca.vertcat(signals.ahead, ahead))
@@ -478,7 +492,8 @@ class System:
                     "fast_control", [dq1, dq2], [fast_control(dq1, dq2, self._control.K_f)], ["dq1", "dq2"], ["u_f"]
                 ),
             }
-        ins, names = [*ref_in, x, *z_in], [*ref_names, "x", *z_names]
+        fed_in, fed_names = (base_in, base_names) if self.measured_base else ([], [])
+        ins, names = [*ref_in, *fed_in, x, *z_in], [*ref_names, *fed_names, "x", *z_names]
         if U_S in seen.parts:
             slow_outputs = [seen.parts[U_S], seen.error, *sigma_out]
             result |= function("slow_control", ins, slow_outputs, names, ["u_s", "e", *sigma_names])
@@ -520,6 +535,8 @@ class System:
         seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished, commanded.a_law]
         later = [commanded.dz, commanded.ahead]
         control_terms, plant_terms = ([term.value for term in self._terms[name]] for name in ("control", "plant"))
+        if self.measured_base:
+            seen, later, control_terms = (without(values, self._still) for values in (seen, later, control_terms))
         if self.structure.effects:
             seen, later, control_terms = (ca.substitute(values, [x], [y]) for values in (seen, later, control_terms))
         dx, *plant_terms = without([dx, *plant_terms], self._still)

@@ -221,7 +221,7 @@ def bind(
     return Export(system, numbers, _tunable(system.slots, tunable), prefix, real, tuple(tables), seconds)
 
 
-_STRUCTURAL = ("law", "controller", "observer", "log_form", "mode", "period", "fast", "l", "m", "p", "r")
+_STRUCTURAL = ("law", "controller", "observer", "feedforward", "log_form", "mode", "period", "fast", "l", "m", "p", "r")
 _STRUCTURE = frozenset(f"control.{key}" for key in _STRUCTURAL)
 
 _FRICTIONS = "|".join(item.name for item in FRICTION)

@@ -22,7 +22,7 @@ from springline.model.base_motion import MOTIONS, moving_terms
 from springline.model.control import CONTROLLERS, INPUT, LAWS, OBSERVERS, LogForm, ObserverInput, SurfaceExponents
 from springline.model.drive import DRIVES, FRICTION, DriveKind
 from springline.model.mechanisms import MECHANISMS
-from springline.model.structure import MotorStart, SignalKind, SignalShape, Structure
+from springline.model.structure import Feedforward, MotorStart, SignalKind, SignalShape, Structure
 from springline.model.system import System, system_of
 from springline.runner.files import InputError, Problem, document_text, read_toml, shortened, unknown
 from springline.runner.scenario import schema
@@ -164,6 +164,7 @@ class Scenario:
             controller=self.registered(control["controller"]),
             observer=self.registered(control["observer"]),
             observer_input=cast(ObserverInput, self._observer_input),
+            feedforward=cast(Feedforward, control["feedforward"]),
             log_form=cast(LogForm, control["log_form"]),
             exponents=SurfaceExponents(**{name: control[name] for name in ("l", "m", "p", "r")}),
             reference=_shape(self.document["reference"], joints),

@@ -24,7 +24,7 @@ from springline.model.integrators import INTEGRATORS
 from springline.model.mechanisms import MECHANISMS, Mechanism
 from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
 from springline.model.registry import Registry
-from springline.model.structure import Structure
+from springline.model.structure import Feedforward, Structure
 from springline.model.system import control_parameters, own_control_tables
 from springline.runner.files import Problem, unknown, value_text
 from springline.runner.scenario.signal_csv import UNITS
@@ -291,6 +291,7 @@ class ControlStructure(Section):
 
     controller: Annotated[str, door("controller", CONTROLLERS)] = _DEFAULT.controller
     observer: Annotated[str, door("observer", OBSERVERS)] = _DEFAULT.observer
+    feedforward: Annotated[str, choice("feedforward", get_args(Feedforward))] = _DEFAULT.feedforward
     law: Annotated[str, door("law", LAWS)] = _DEFAULT.law
     log_form: Annotated[str, choice("log_form", get_args(LogForm))] = _DEFAULT.log_form
     l: Annotated[int, _EXPONENT] = _DEFAULT.exponents.l  # noqa: E741 - the paper's letter

@@ -16,7 +16,7 @@ from springline.codegen.export.c import generate_files
 from springline.codegen.export.fmu import Settings, fmu
 from springline.codegen.files import write_tree
 from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, Runs, kernel
-from springline.model.structure import Structure
+from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 
 STEP, STEPS, HOLD = 1e-4, 400, 10
@@ -24,6 +24,7 @@ STEP, STEPS, HOLD = 1e-4, 400, 10
 CASES: list[dict[str, Any]] = [
     {"controller": "super_twisting", "observer": "extended_state", "observer_input": "spring"},
     {"controller": "nonsingular_terminal", "observer": "disturbance", "drive": "rigid"},
+    {"controller": "computed_torque", "observer": "disturbance", "feedforward": "base"},
 ]
 cases = pytest.mark.parametrize("chosen", CASES, ids=lambda chosen: str(chosen["controller"]))
 
@@ -92,4 +93,25 @@ def test_the_loop_in_an_fmu_is_the_loop(chosen: dict[str, Any], tmp_path: Path) 
         client.step(k * STEP, 5 * STEP)
         rows.append(client.get(names))
     np.testing.assert_array_equal(rows, run(structure, True, values, 5).trajectory[0][:, 1:])
+    client.slave.freeInstance()
+
+
+def test_an_importer_s_base_reaches_the_controller(tmp_path: Path) -> None:
+    """A loop whose base the importer moves computes the command of the exported control at that motion."""
+    structure, values = case({"controller": "computed_torque", "feedforward": "base", "base_motion": SignalShape()})
+    values[[slot.key.startswith("control.U_max") for slot in System(structure).slots]] = 1e6
+    settings = Settings(duration=STEPS * STEP, step=STEP, period=0.0)
+    content = fmu(structure, values, settings, part="loop", version=2, identifier="fed", name="fed")
+    (tmp_path / "fed.fmu").write_bytes(content)
+    client = Client(tmp_path / "fed.fmu", tmp_path).start()
+    (still,) = client.get(["U_lift"])
+    client.set(["dd_y_r1"], [2.0])
+    pushed, told = client.get(["U_lift", "measured_dd_y_r1"])
+    assert told == 2.0
+    system = System(structure)
+    w = np.array(system.function("signals")(0.0, [], values)).ravel()
+    x = np.array(system.function("start")(0.0, [], values)).ravel()
+    wished = system.function("control")(*np.split(w[:6], 3), np.zeros(3), np.zeros(3), [2.0, 0.0, 0.0], x, values)[0]
+    assert pushed == pytest.approx(float(wished[0]), rel=1e-12)
+    assert abs(pushed - still) > 10.0
     client.slave.freeInstance()

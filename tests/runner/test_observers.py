@@ -74,6 +74,34 @@ def test_on_the_ship_the_error_is_smaller(controller: str) -> None:
     assert error(**observing("extended_state", input="spring")) < 0.6 * alone
 
 
+FED = {"control.feedforward": "base", "control.controller": "computed_torque"}
+SWELL = {
+    "base_motion.kind": "sine",
+    "base_motion.heave": [{"amplitude": 0.5, "omega": 3.0}],
+    "base_motion.pitch": [{"amplitude": 0.1, "omega": 2.0}],
+    "base_motion.roll": [{"amplitude": 0.1, "omega": 2.5}],
+    "base_motion.sway": [{"amplitude": 0.3, "omega": 2.2}],
+    "base_motion.mount": [3.0, 1.0, 0.5],
+}
+
+
+def test_with_feedforward_a_rigid_arm_does_not_feel_the_ship() -> None:
+    """dde + 60 de + 900 e = 0 as on a base at rest, in six coordinates and away from the ship's origin."""
+    changes = SWELL | FED | {"drive.kind": "rigid", "simulation.duration": 1.0}
+    t, e = columns(changes, "t", "e_lift")
+    np.testing.assert_allclose(e, (-0.8 + (np.pi + 30 * -0.8) * t) * np.exp(-30 * t), atol=1e-9)
+    (felt,) = columns(changes | {"control.feedforward": "none"}, "e_lift")
+    assert np.max(np.abs(felt[500:])) > 1e-3
+
+
+def test_an_observer_does_not_find_again_what_is_fed_forward() -> None:
+    changes = SWELL | FED | {"drive.kind": "rigid", "simulation.duration": 1.0} | observing("extended_state")
+    (found,) = columns(changes, "z_d_hat_lift")
+    assert np.max(np.abs(found)) < 1e-6
+    (alone,) = columns(changes | {"control.feedforward": "none"}, "z_d_hat_lift")
+    assert np.max(np.abs(alone)) > 1.0
+
+
 def test_a_resolved_scenario_says_what_drives_it() -> None:
     scenario = load_scenario("paper/nominal", observing("disturbance"))
     assert 'input = "command"' in scenario.to_toml()
