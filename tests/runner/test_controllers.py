@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 
 from springline.model.control import CONTROLLERS
 from springline.model.mechanisms import MECHANISMS
@@ -163,3 +167,20 @@ def test_a_mechanism_s_defaults_for_one_controller_are_for_it_alone(monkeypatch:
     monkeypatch.setattr(type(arm), "control_defaults", {"super_twisting.slope": 4.0})
     assert arm.fitted(parameter, "super_twisting").default == 4.0
     assert arm.fitted(parameter, "other").default == parameter.default
+
+
+def test_a_sweep_over_controllers_has_null_for_what_one_lacks(tmp_path: Path) -> None:
+    file = tmp_path / "rivals.toml"
+    file.write_text(
+        'scenario = "paper/group1_shake"\nmethod = "grid"\n[set]\ndrive.kind = "rigid"\nsimulation.duration = 1.0\n'
+        '[vary]\ncontrol.controller = { values = ["terminal_sliding", "computed_torque"] }\n'
+        "plant.m3.scale = { values = [1.0, 1.2] }\n"
+    )
+    command = [Path(sys.executable).with_name("springline"), "batch", file, "-o", tmp_path / "out", "--jobs", "1"]
+    subprocess.run(command, check=True, capture_output=True)
+    table = parquet.read_table(sorted((tmp_path / "out").glob("part-*.parquet")))
+    rows = table.select(["control.controller", "sigma_tv_lift", "U_tv_lift"]).to_pylist()
+    assert len(rows) == 4
+    for row in rows:
+        assert (row["sigma_tv_lift"] is None) == (row["control.controller"] == "computed_torque")
+        assert row["U_tv_lift"] > 0.0
