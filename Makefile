@@ -43,7 +43,7 @@ docs-tables: .venv/installed ## print the tables of columns and metrics in docs/
 	$(BIN)/python -m runner.report.docs_tables --write
 
 docs-controllers: .venv/installed ## simulate the table of docs/controllers.md anew; takes minutes
-	$(BIN)/python -m runner.report.controllers_table --write
+	$(BIN)/python -m benchmarks.controllers_table --write
 
 docs-pictures: .venv/installed ## draw the pictures of docs/architecture.md and docs/conventions.md anew
 	$(BIN)/python -m runner.report.architecture

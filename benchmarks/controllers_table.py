@@ -1,6 +1,6 @@
 """The table of docs/controllers.md: how well each controller holds the arm on a ship, alone and with help.
 
-    python -m runner.report.controllers_table [--write]
+    python -m benchmarks.controllers_table [--write]
 
 Prints it; --write (`make docs-controllers`) puts it into the page, between the comments that name it. It takes minutes,
 for every row is a structure, and so a kernel, of its own.
@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from springline.model.control import CONTROLLERS
-from springline.runner.report.docs_tables import put
+from springline.runner.report import put
 from springline.runner.run import Result, simulate
 from springline.runner.scenario import Scenario, load_scenario
 
-PAGE = Path(__file__).parents[2] / "docs" / "controllers.md"
+PAGE = Path(__file__).parent.parent / "docs" / "controllers.md"
 NAME = "on the ship"
 
 SHIPS: Mapping[str, Mapping[str, object]] = {
@@ -51,7 +51,7 @@ def errors(scenario: Scenario, result: Result) -> tuple[float, float, float]:
     system = scenario.system()
     joints = [joint.name for joint in system.joints]
     lift, rotation = (np.sqrt(np.mean(table[f"e_{joint}"].to_numpy()[late] ** 2)) for joint in joints)
-    names = [entry.name for entry in (*system.base_motion[0].entries(system.joints),)]
+    names = [entry.name for entry in system.base_motion[0].entries(system.joints)]
     base = np.array([table[name].to_numpy()[late] for name in names])
     wished = np.zeros((system.x.numel(), base.shape[1]))
     wished[: system.n] = [table[f"q1d_{joint}"].to_numpy()[late] for joint in joints]
