@@ -1,9 +1,11 @@
 from . import quantities as quantities
 from . import theory as theory
 from .base_motion import BaseMotion as BaseMotion
+from .control import Condition as Condition
 from .control import Control as Control
 from .control import Controller as Controller
 from .control import Law as Law
+from .control import Observer as Observer
 from .mechanisms import Body as Body
 from .mechanisms import Link as Link
 from .mechanisms import Mechanism as Mechanism

@@ -6,12 +6,13 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from springline.model.base import BaseCoordinate, moving
-from springline.model.control import LogForm, SurfaceExponents
+from springline.model.control import LogForm, ObserverInput, SurfaceExponents
 from springline.model.drive import DriveKind
 
 SignalKind = Literal["none", "sine", "polynomial", "table", "own", "input"]
 MotorStart = Literal["unloaded", "equilibrium", "given"]
 JointStart = Literal["given", "reference"]
+Feedforward = Literal["none", "base"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +36,8 @@ class Structure:
 
     size           how many joints a mechanism has that comes in several sizes, 0 for as many as it has
     controller     by name; law, log_form and exponents are those of one that has a reaching law
+    observer       of disturbances, by name;  observer_input: what drives it
+    feedforward    whether the controller is told how the base moves
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
     effects        properties of sensors and motors, by name, in the order in which they act
     disturbance    forces on the links, per joint; not even zero where its kind is "none"
@@ -62,6 +65,9 @@ class Structure:
     mount_rpy: bool = False
     friction: tuple[str, ...] = ()
     disturbance: SignalShape = SignalShape()
+    observer: str = "none"
+    observer_input: ObserverInput = "command"
+    feedforward: Feedforward = "none"
 
     @property
     def base_coordinates(self) -> tuple[BaseCoordinate, ...]:

@@ -25,12 +25,16 @@ from springline.model.control import (
     CONTROLLERS,
     K_F,
     LAWS,
+    OBSERVERS,
     SURFACE_PARAMETERS,
     U_MAX,
     ArmModel,
+    Condition,
     Controller,
     ControlSignals,
     Law,
+    Observer,
+    Observing,
     commanded,
     fast_control,
 )
@@ -43,6 +47,7 @@ from springline.model.drive import (
     diagonal,
     friction,
     friction_parameters,
+    spring_force,
     static_motor_position,
 )
 from springline.model.dynamics import EquationsOfMotion, equations_of_motion
@@ -76,8 +81,16 @@ from springline.model.quantities import (
 )
 from springline.model.signal_symbols import SignalSymbols
 from springline.model.structure import Structure
-from springline.model.symbolic import as_written, associated, derivation, derived_property, over_runs, without
-from springline.model.terms import Term, noted
+from springline.model.symbolic import (
+    as_written,
+    associated,
+    derivation,
+    derived_property,
+    over_runs,
+    solve_spd,
+    without,
+)
+from springline.model.terms import Term, named, noted, section
 from springline.model.tip import tip_motion
 
 # Relative to the largest eigenvalue: a mass matrix below this is singular to the precision of what is computed with it.
@@ -99,13 +112,14 @@ def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tu
 
 
 def own_control_tables(structure: Structure) -> dict[str, tuple[Parameter, ...]]:
-    """Tables [control.<name>] of a structure: the parameters of its controller, and of a law that is a user's own."""
+    """Tables [control.<name>] of a structure: of its controller, its observer, and a law that is a user's own."""
     mechanism = MECHANISMS[structure.mechanism].of_size(structure.size)
     controller = CONTROLLERS[structure.controller]
     law = LAWS[structure.law]
-    owners: list[Controller | Law] = [controller] if LAWS.is_packaged(structure.law) else [controller, law]
+    owners: list[Controller | Law | Observer] = [controller, OBSERVERS[structure.observer]]
+    owners += [] if LAWS.is_packaged(structure.law) else [law]
     return {
-        item.name: tuple(mechanism.fitted(parameter) for parameter in item.parameters)
+        item.name: tuple(mechanism.fitted(parameter, item.name) for parameter in item.parameters)
         for item in owners
         if item.parameters
     }
@@ -144,6 +158,9 @@ class System:
         self.drive: Drive = DRIVES[self.structure.drive]
         law = LAWS[self.structure.law].with_form(self.structure.log_form)
         self.controller: Controller = CONTROLLERS[self.structure.controller].with_law(law, self.structure.exponents)
+        self.observer: Observer | None = None
+        if self.structure.observer != "none":
+            self.observer = OBSERVERS[self.structure.observer].driven_by(self.structure.observer_input)
         self.tableau: Tableau = INTEGRATORS[self.structure.integrator]
         self.joints: tuple[Joint, ...] = self.mechanism.joints
         self.n = n = len(self.joints)
@@ -157,8 +174,12 @@ class System:
         self._plant = vector.table("plant", (*arm, *drive), self.joints)
         control_table = control_parameters(self.mechanism, self.structure.drive)
         self._control = vector.table("control", control_table, self.joints)
-        for table, own in own_control_tables(self.structure).items():
-            self._control |= vector.table(f"control.{table}", own, self.joints)
+        tables = own_control_tables(self.structure).items()
+        own = {table: vector.table(f"control.{table}", declared, self.joints) for table, declared in tables}
+        # What an observer calls its parameters is no concern of the controller's, nor the other way round.
+        self._observing = self._control | (own.pop(self.observer.name, Values({})) if self.observer else Values({}))
+        for values in own.values():
+            self._control |= values
 
         self.t = ca.SX.sym("t")
         symbols = SignalSymbols(self.t, vector)
@@ -268,7 +289,17 @@ class System:
     @property
     def controller_states(self) -> tuple[Quantity, ...]:
         """What z consists of, by the names of its columns."""
-        return tuple(replace(state, name=f"z_{state.name}") for state in self.controller.states)
+        states = (*self.controller.states, *(self.observer.states if self.observer else ()))
+        return tuple(replace(state, name=f"z_{state.name}") for state in states)
+
+    @property
+    def measured_base(self) -> tuple[Quantity, ...]:
+        """The base's motion as the controller is told of it, where it is."""
+        if self.structure.feedforward == "none":
+            return ()
+        return tuple(
+            replace(item, name=f"measured_{item.name}", meaning=f"measured {item.meaning}") for item in self.base_motion
+        )
 
     @property
     def memory(self) -> tuple[Entry, ...]:
@@ -384,6 +415,24 @@ class System:
             remedy = "expected every joint to move a mass or an inertia (or start elsewhere, initial.q)"
             raise Implausible(f"the mass matrix at the start ({at}) {least}: {remedy}", k)
 
+    @derivation
+    def unmet(self, values: np.ndarray) -> tuple[str, ...]:
+        """Sentences on gains, in the parameter vector p, that are less than what the controller's theory asks for."""
+        owners: list[tuple[Controller | Observer, Condition]]
+        owners = [(self.controller, item) for item in self.controller.conditions(self._control)]
+        if self.observer:
+            owners += [(self.observer, item) for item in self.observer.conditions(self._observing)]
+        found = []
+        for owner, item in owners:
+            pair = ca.Function("pair", [self.p], [ca.densify(item.value), ca.densify(item.least)])(values)
+            gains, least = (np.array(side).ravel() for side in pair)
+            for i, (gain, bound) in enumerate(zip(gains, np.broadcast_to(least, gains.shape), strict=True)):
+                if not gain > bound:
+                    key = f"control.{owner.name}.{item.gain}" + (f".{i}" if gains.size > 1 else "")
+                    text = f"expected > {item.relation} = {bound:.6g}, or {item.effect} does not follow from"
+                    found.append(f"{key} is {gain:.6g}: {text} {item.theorem}")
+        return tuple(found)
+
     def terms(self, name: str) -> tuple[Term, ...]:
         """What the model calls the parts of Function `name`; they are the outputs of Function `name`_terms."""
         return self._terms.get(name, ()) if self.functions else ()
@@ -410,16 +459,31 @@ class System:
 
     def _signals_of_control(self) -> ControlSignals:
         nominal = equations_of_motion(self.mechanism, self.q1, self.dq1, self.base, self._nominal, self.arm.form)
-        return commanded(
-            self.controller,
-            self.joints,
-            Values({"q": self.q1d, "dq": self.dq1d, "ddq": self.ddq1d}),
-            Values({item.name: symbol for item, symbol in self._state.items()}),
-            self.z,
-            ArmModel(nominal, self.q1, self.dq1, diagonal(self.mechanism.motor_inertia, self._nominal)),
-            self._control,
-            self.h,
-        )
+        model = ArmModel(nominal, self.q1, self.dq1, diagonal(self.mechanism.motor_inertia, self._nominal))
+        y = Values({item.name: symbol for item, symbol in self._state.items()})
+        own = len(entries(self.controller.states, self.joints))
+        z, z_observer = ca.vertsplit(self.z, [0, own, self.z.numel()])
+        ddq = self.ddq1d
+        observing = None
+        if self.measured_base:
+            with section("what the moving base does", "docs/controllers.md 5"):
+                ddq = named("ddq_fed", ddq - named("ddq_base", solve_spd(model(y.q1, y.dq1).H, nominal.disturbance)))
+        if self.observer:
+            observing = Observing(self.observer, self.joints, y, z_observer, model, self._observing)
+            with section("what the observer has found", "docs/controllers.md 4"):
+                ddq = named("ddq_d", ddq - named("d", observing.d))
+        r = Values({"q": self.q1d, "dq": self.dq1d, "ddq": ddq})
+        signals = commanded(self.controller, self.joints, r, y, z, model, self._control, self.h)
+        if observing is None:
+            return signals
+        force = signals.command
+        if self.structure.observer_input == "spring":
+            force = spring_force(y.q1, y.q2, diagonal(self.mechanism.stiffness, self._nominal))
+        if self.measured_base:  # which is no disturbance any more
+            force = force + nominal.disturbance
+        rates = observing.rates(force)
+        ahead = z_observer + self.h * rates
+        return replace(signals, dz=ca.vertcat(signals.dz, rates), ahead=ca.vertcat(signals.ahead, ahead))
 
     def _function(
         self, name: str, inputs: list[ca.SX], outputs: list[ca.SX], names_in: list[str], names_out: list[str]
@@ -449,7 +513,7 @@ class System:
         plant_in, plant_names = [*base_in, *force_in, x, self.u], [*base_names, *force_names, "x", "u"]
         slow_args, slow_names = [*base_in, q1, dq1, u_slow], [*base_names, "q1", "dq1", "u_s"]
         slow = perturbation.slow_dynamics(u_slow, real.disturbance, real, m2)
-        z_in, z_names = ([self.z], ["z"]) if self.controller.states else ([], [])
+        z_in, z_names = ([self.z], ["z"]) if self.memory else ([], [])
         parts, part_names = list(seen.parts.values()), [item.name.lower() for item in seen.parts]
         sigma_out, sigma_names = ([seen.sigma], ["sigma"]) if self.sliding else ([], [])
         result = {
@@ -472,7 +536,8 @@ class System:
                     "fast_control", [dq1, dq2], [fast_control(dq1, dq2, self._control.K_f)], ["dq1", "dq2"], ["u_f"]
                 ),
             }
-        ins, names = [*ref_in, x, *z_in], [*ref_names, "x", *z_names]
+        fed_in, fed_names = (base_in, base_names) if self.measured_base else ([], [])
+        ins, names = [*ref_in, *fed_in, x, *z_in], [*ref_names, *fed_names, "x", *z_names]
         if U_S in seen.parts:
             slow_outputs = [seen.parts[U_S], seen.error, *sigma_out]
             result |= function("slow_control", ins, slow_outputs, names, ["u_s", "e", *sigma_names])
@@ -485,7 +550,7 @@ class System:
         )
         result |= self._named("control", ins, [term.value for term in self._terms["control"]], names)
         result |= self._named("plant", plant_in, [term.value for term in self._terms["plant"]], plant_names)
-        if self.controller.states:
+        if self.memory:
             result |= {
                 **function("rates", ins, [seen.dz], names, ["dz"]),
                 **function("update", [*ins, self.h], [seen.ahead], [*names, "h"], ["z_next"]),
@@ -508,12 +573,14 @@ class System:
     def _loop(self, real: EquationsOfMotion, commanded: ControlSignals, dx: ca.SX) -> dict[str, ca.Function]:
         """What the simulation loop consists of."""
         w, x, function = self.w, self.x, self._function
-        z_in, z_names = ([self.z], ["z"]) if self.controller.states else ([], [])
+        z_in, z_names = ([self.z], ["z"]) if self.memory else ([], [])
         ins, names = [w, x, *z_in], ["w", "x", *z_names]
         y = ca.vertcat(*sensed(self.structure.effects, self._state).values())
         seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished, commanded.a_law]
         later = [commanded.dz, commanded.ahead]
         control_terms, plant_terms = ([term.value for term in self._terms[name]] for name in ("control", "plant"))
+        if self.measured_base:
+            seen, later, control_terms = (without(values, self._still) for values in (seen, later, control_terms))
         if self.structure.effects:
             seen, later, control_terms = (ca.substitute(values, [x], [y]) for values in (seen, later, control_terms))
         dx, *plant_terms = without([dx, *plant_terms], self._still)
@@ -530,7 +597,7 @@ class System:
         if self.tip is not None:
             at = ca.substitute(self.tip, w, self._signal_expressions)
             result |= function("loop_tip", [self.t, self.d, x], [at], ["t", "d", "x"], ["tip"])
-        if self.controller.states:
+        if self.memory:
             result |= {
                 **function("loop_rates", ins, later[:1], names, ["dz"]),
                 **function("loop_update", [*ins, self.h], later[1:], [*names, "h"], ["z_next"]),

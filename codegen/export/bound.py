@@ -139,7 +139,7 @@ class Export:
                 for table in self.tables
             ],
         }
-        if self.system.controller.states:  # nothing else depends on it
+        if self.system.memory:  # nothing else depends on it
             identity["period"] = self.period
         digest = hashlib.sha256(canonical_json(identity))
         for function in self.system.functions.values():
@@ -221,7 +221,8 @@ def bind(
     return Export(system, numbers, _tunable(system.slots, tunable), prefix, real, tuple(tables), seconds)
 
 
-_STRUCTURE = frozenset(f"control.{key}" for key in ("law", "log_form", "mode", "period", "fast", "l", "m", "p", "r"))
+_STRUCTURAL = ("law", "controller", "observer", "feedforward", "log_form", "mode", "period", "fast", "l", "m", "p", "r")
+_STRUCTURE = frozenset(f"control.{key}" for key in _STRUCTURAL)
 
 _FRICTIONS = "|".join(item.name for item in FRICTION)
 _ABSENT_AT_ZERO = re.compile(rf"((drive|plant)\.({_FRICTIONS})|base_motion\.mount(_rpy)?)(\.\d+)?")

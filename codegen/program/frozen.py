@@ -75,7 +75,7 @@ def program(structure: Structure) -> Program:
     """Build, stage and freeze the Program of a structure."""
     system = system_of(structure)
     t, d, w, x, u, p = system.t, system.d, system.w, system.x, system.u, system.p
-    z = [system.z] if system.controller.states else []
+    z = [system.z] if system.memory else []
     later = ("rates", "update") if z else ()
     loop = {name: system.function(f"loop_{name}") for name in ("error", "control", "plant", *later)}
     sources = {"signals": system.function("signals"), "start": system.function("start"), **loop}

@@ -2,10 +2,16 @@ from .common import K_F as K_F
 from .common import U_MAX as U_MAX
 from .common import fast_control as fast_control
 from .controller import ArmModel as ArmModel
+from .controller import Condition as Condition
 from .controller import Control as Control
 from .controller import ControlSignals as ControlSignals
 from .controller import Controller as Controller
 from .controller import commanded as commanded
+from .disturbance_observers import OBSERVERS as OBSERVERS
+from .observer import INPUT as INPUT
+from .observer import Observer as Observer
+from .observer import ObserverInput as ObserverInput
+from .observer import Observing as Observing
 from .reaching import A_MAX as A_MAX
 from .reaching import LARGEST_EXPONENT as LARGEST_EXPONENT
 from .reaching import LAWS as LAWS

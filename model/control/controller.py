@@ -23,7 +23,15 @@ import casadi as ca
 
 from springline.model.control.reaching import Law
 from springline.model.control.sliding import SurfaceExponents
-from springline.model.declared import expect_names, expect_parameters, expect_text, is_number, snake_case
+from springline.model.declared import (
+    expect_names,
+    expect_parameters,
+    expect_text,
+    hash_of,
+    is_number,
+    snake_case,
+    symbols_of,
+)
 from springline.model.dynamics import EquationsOfMotion
 from springline.model.parameters import Joint, Parameter, Values
 from springline.model.perturbation import slow_mass
@@ -52,6 +60,14 @@ class ArmModel:
         self._symbols = ca.vertcat(q, dq)
         self._terms = ArmTerms(terms.mass, terms.coriolis, terms.gravity, slow_mass(terms.mass, motor_inertia))
 
+    @property
+    def constants(self) -> ca.SX:
+        """What the terms depend on besides q and dq, as a column."""
+        terms = self._terms
+        known = symbols_of(self._symbols)
+        everything = ca.symvar(ca.vertcat(*(ca.vec(item) for item in (terms.M, terms.c, terms.G, terms.H))))
+        return ca.vertcat(ca.SX(0, 1), *(item for item in everything if hash_of(item) not in known))
+
     def __call__(self, q: ca.SX, dq: ca.SX) -> ArmTerms:
         """The terms at q, dq."""
         at = ca.vertcat(q, dq)
@@ -78,6 +94,23 @@ class Control:
     dz: Rates = field(default_factory=dict)
     diagnostics: Mapping[str, ca.SX] = field(default_factory=dict)
     a_law: ca.SX | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """What a theorem asks of a gain: that it be greater than something. Where it is not, the user is warned.
+
+    gain     the parameter;  value: it, a scalar or n x 1
+    least    what it must exceed, likewise;  relation: that as a formula, for people
+    theorem  for people;  effect: what does not follow from it otherwise
+    """
+
+    gain: str
+    value: ca.SX
+    least: ca.SX
+    relation: str
+    theorem: str
+    effect: str
 
 
 class Controller(ABC):
@@ -119,6 +152,10 @@ class Controller(ABC):
         """The states one sample of h seconds later, where the control is sampled; None for an explicit Euler step."""
         return None
 
+    def conditions(self, p: Values) -> Sequence[Condition]:
+        """What its theory asks of its gains."""
+        return ()
+
 
 @dataclass(frozen=True, slots=True)
 class ControlSignals:
@@ -140,13 +177,50 @@ class ControlSignals:
     ahead: ca.SX
 
 
-def states_of(controller: Controller, joints: Sequence[Joint], z: ca.SX) -> Values:
+def states_of(declared: Sequence[Quantity], joints: Sequence[Joint], z: ca.SX) -> Values:
     """The column z by the states' names."""
-    sizes = [len(state.entries(joints)) for state in controller.states]
+    sizes = [len(state.entries(joints)) for state in declared]
     ends = [sum(sizes[: k + 1]) for k in range(len(sizes))]
-    return Values({
-        state.name: z[end - size : end] for state, size, end in zip(controller.states, sizes, ends, strict=True)
-    })  # fmt: skip
+    return Values({state.name: z[end - size : end] for state, size, end in zip(declared, sizes, ends, strict=True)})
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What a controller or an observer gives, by name and shape. Its methods raise ValueError with the owner's name.
+
+    owner  "controller servo"
+    """
+
+    owner: str
+    joints: Sequence[Joint]
+
+    def column(self, what: str, value: ca.SX, rows: int) -> ca.SX:
+        """A value that must have one column."""
+        shape = ca.SX(value).shape
+        if shape != (rows, 1):
+            raise ValueError(f"{self.owner}: {what} has shape {shape[0]} x {shape[1]}, expected {rows} x 1")
+        return ca.SX(value)
+
+    def by_name(self, what: str, values: Mapping[str, ca.SX], wanted: Sequence[Quantity]) -> dict[str, ca.SX]:
+        """Values of some quantities, in their order; no others."""
+        unknown = [name for name in values if name not in {item.name for item in wanted}]
+        if unknown:
+            known = ", ".join(item.name for item in wanted) or "nothing"
+            raise ValueError(f"{self.owner}: {what} has {unknown[0]!r}, expected {known}")
+        return {
+            item.name: self.column(f"{what} of {item.name!r}", values[item.name], len(item.entries(self.joints)))
+            for item in wanted
+            if item.name in values
+        }
+
+    def stacked(self, what: str, values: Mapping[str, ca.SX], states: Sequence[Quantity]) -> ca.SX:
+        """Values of all states, one column."""
+        found = self.by_name(what, values, states)
+        for state in states:
+            if state.name not in found:
+                size = len(state.entries(self.joints))
+                raise ValueError(f"{self.owner}: {what} has no {state.name!r}, expected {size} x 1 for this state")
+        return ca.vertcat(*found.values()) if found else ca.SX(0, 1)
 
 
 def commanded(
@@ -164,7 +238,8 @@ def commanded(
     z  the states as one column;  h: the sample period, s;  the others as in Controller.control
     Raises ValueError, with the controller's name, for what it leaves out, has too much, or gives another shape.
     """
-    n, states = len(joints), states_of(controller, joints, z)
+    n, states = len(joints), states_of(controller.states, joints, z)
+    checked = Checked(f"controller {controller.name}", joints)
     given = controller.control(r, y, states, model, p)
     if not isinstance(given, Control):
         raise ValueError(f"controller {controller.name}: control: expected a Control, got {type(given).__name__}")
@@ -175,38 +250,14 @@ def commanded(
                 f"got {type(items).__name__}"
             )
 
-    def column(what: str, value: ca.SX, rows: int) -> ca.SX:
-        shape = ca.SX(value).shape
-        if shape != (rows, 1):
-            text = f"{what} has shape {shape[0]} x {shape[1]}, expected {rows} x 1"
-            raise ValueError(f"controller {controller.name}: {text}")
-        return ca.SX(value)
-
-    def by_name(what: str, values: Mapping[str, ca.SX], wanted: Sequence[Quantity]) -> dict[str, ca.SX]:
-        unknown = [name for name in values if name not in {item.name for item in wanted}]
-        if unknown:
-            known = ", ".join(item.name for item in wanted) or "nothing"
-            raise ValueError(f"controller {controller.name}: {what} has {unknown[0]!r}, expected {known}")
-        return {
-            item.name: column(f"{what} of {item.name!r}", values[item.name], len(item.entries(joints)))
-            for item in wanted
-            if item.name in values
-        }
-
     def stacked(what: str, rates: Rates) -> ca.SX:
-        found = by_name(what, rates(command) if callable(rates) else rates, controller.states)
-        for state in controller.states:
-            if state.name not in found:
-                size = len(state.entries(joints))
-                text = f"{what} has no {state.name!r}, expected {size} x 1 for this state"
-                raise ValueError(f"controller {controller.name}: {text}")
-        return ca.vertcat(*found.values()) if found else ca.SX(0, 1)
+        return checked.stacked(what, rates(command) if callable(rates) else rates, controller.states)
 
-    wished, error = column("u", given.u, n), column("error", given.error, n)
+    wished, error = checked.column("u", given.u, n), checked.column("error", given.error, n)
     if controller.law and given.a_law is None:
         raise ValueError(f"controller {controller.name}: Control has no a_law, expected what its law asks for")
-    a_law = ca.SX.zeros(n) if given.a_law is None else column("a_law", given.a_law, n)
-    shown = by_name("diagnostics", given.diagnostics, controller.diagnostics)
+    a_law = ca.SX.zeros(n) if given.a_law is None else checked.column("a_law", given.a_law, n)
+    shown = checked.by_name("diagnostics", given.diagnostics, controller.diagnostics)
     if SIGMA in controller.diagnostics and SIGMA.name not in shown:
         raise ValueError(f"controller {controller.name}: diagnostics has no 'sigma', which the class declares")
     parts = {item: shown[item.name] for item in controller.diagnostics if item != SIGMA and item.name in shown}
@@ -230,12 +281,16 @@ def check_controller(controller: Controller) -> None:
     expect_text(owner, "title", controller.title)
     expect_parameters(owner, "parameters", controller.parameters, ())
     for what in ("states", "diagnostics"):
-        declared = getattr(controller, what)
-        if not isinstance(declared, tuple) or not all(isinstance(item, Quantity) for item in declared):
-            raise ValueError(f"{owner}: {what}: expected a tuple of Quantity, got {declared!r}")
-        expect_names(owner, what, [item.name for item in declared])
-        for item in declared:
-            for text in (item.unit, item.meaning):
-                expect_text(owner, f"{what}, {item.name}", text)
-            if not is_number(item.initial) or not math.isfinite(item.initial):
-                raise ValueError(f"{owner}: {what}, {item.name}: expected a finite initial value, got {item.initial!r}")
+        check_states(owner, what, getattr(controller, what))
+
+
+def check_states(owner: str, what: str, declared: object) -> None:
+    """Raise ValueError for what is no tuple of quantities with different names, units and finite initial values."""
+    if not isinstance(declared, tuple) or not all(isinstance(item, Quantity) for item in declared):
+        raise ValueError(f"{owner}: {what}: expected a tuple of Quantity, got {declared!r}")
+    expect_names(owner, what, [item.name for item in declared])
+    for item in declared:
+        for text in (item.unit, item.meaning):
+            expect_text(owner, f"{what}, {item.name}", text)
+        if not is_number(item.initial) or not math.isfinite(item.initial):
+            raise ValueError(f"{owner}: {what}, {item.name}: expected a finite initial value, got {item.initial!r}")

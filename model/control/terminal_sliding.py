@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-import casadi as ca
-
-from springline.model.control.common import fast_control
-from springline.model.control.controller import ArmModel, ArmTerms, Control, Controller
+from springline.model.control.common import composite, slow_control, tracking_error
+from springline.model.control.controller import ArmModel, Control, Controller
 from springline.model.control.reaching import LAWS, Law, reaching_rate
 from springline.model.control.sliding import SurfaceExponents, surface
 from springline.model.parameters import Values
 from springline.model.quantities import SIGMA, U_F, U_S
 from springline.model.terms import named, section
-
-
-def slow_control(ddq_d: ca.SX, u_e: ca.SX, arm: ArmTerms) -> ca.SX:
-    """U_s = H (ddq1d - u_e) + C dq1 + G, n x 1, with nominal parameters                                   (14)."""
-    named("H", arm.H), named("C_dq1", arm.c), named("G", arm.G)
-    return arm.H @ named("ddq", ddq_d - u_e) + arm.c + arm.G
 
 
 @dataclass(frozen=True)
@@ -49,17 +41,12 @@ class TerminalSliding(Controller):
     def control(self, r: Values, y: Values, z: Values, model: ArmModel, p: Values) -> Control:
         """Command, error, sliding variable and the two parts of the command."""
         with section("tracking error and sliding variable", "(22), E3"):
-            error, rate_error = named("e", r.q - y.q1), named("de", r.dq - y.dq1)
+            error, rate_error = tracking_error(r, y)
             sigma, surface_rate = surface(error, rate_error, p, self.exponents)
             named("sigma", sigma), named("dsurface", surface_rate)
         with section(f"reaching law: {self.reaching.title}", f"{self.reaching.equations}, limit E4"):
             rate, a_law = reaching_rate(self.reaching, sigma, p)
         with section("slow control: computed torque", "(14), (25)"):
             u_e = named("u_e", rate - surface_rate)
-            wished = slow = named("u_s", slow_control(r.ddq, u_e, model(y.q1, y.dq1)))
-        diagnostics = {SIGMA.name: sigma, U_S.name: slow}
-        if "dq2" in y:
-            with section("fast control", "(33)"):
-                fast = named("u_f", fast_control(y.dq1, y.dq2, p.K_f))
-            wished, diagnostics[U_F.name] = slow + fast, fast
-        return Control(wished, error, diagnostics=diagnostics, a_law=a_law)
+            slow = named("u_s", slow_control(r.ddq, u_e, model(y.q1, y.dq1)))
+        return replace(composite(r, y, model, p, slow, error, sigma), a_law=a_law)

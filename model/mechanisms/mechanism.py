@@ -51,7 +51,8 @@ class Mechanism:
     start_position    initial joint coordinates; () for all zero
     start_rate        initial joint rates; () for all zero
     limits            least and greatest coordinate of each joint, beyond which a run ends; () for none
-    control_defaults  what the controller's parameters are for this arm, by name: a number, or one per joint
+    control_defaults  what the controller's parameters are for this arm, by name, "super_twisting.slope" for one of
+                      [control.super_twisting]: a number, or one per joint
     regular           whether its mass matrix is positive definite for all that its parameters may be
     sizes             how many joints it may have, where that is open; `of_size` then gives the arm with so many
     source            where its equations and numbers come from, a sentence; "" where there is nothing to cite
@@ -153,12 +154,14 @@ class Mechanism:
         """Where the arm ends, 3 x 1, m, base axes; None for an arm that does not say."""
         return None
 
-    def fitted(self, parameter: Parameter) -> Parameter:
+    def fitted(self, parameter: Parameter, table: str = "") -> Parameter:
         """A parameter of the controller with the default that suits this arm.
+
+        table  the [control.<table>] that it stands in: "<table>.<name>" in `control_defaults` is it alone
 
         K_f, unless `control_defaults` has it, damps each motor on its spring with half of the critical damping.
         """
-        own = self.control_defaults.get(parameter.name)
+        own = self.control_defaults.get(f"{table}.{parameter.name}", self.control_defaults.get(parameter.name))
         if own is None and parameter.name == "K_f":
             inertia, stiffness = (self._diagonal(declared) for declared in (self.motor_inertia, self.stiffness))
             own = tuple(2 * _FAST_DAMPING * math.sqrt(m * k) for m, k in zip(inertia, stiffness, strict=True))

@@ -62,7 +62,8 @@ def resolve(
     joints = MECHANISMS[mechanism].of_size(size).joints
     motion = names["base_motion.kind"] if schema.names_file(given["base_motion"].get("kind")) else ""
     try:
-        shape = schema.schema(mechanism, drive, names["control.controller"], names["control.law"], size, motion)
+        controller, law, observer = (names[f"control.{key}"] for key in ("controller", "law", "observer"))
+        shape = schema.schema(mechanism, drive, controller, law, size, motion, observer)
     except ValueError as error:
         raise InputError(*problems, Problem(where, "control", str(error))) from error
 

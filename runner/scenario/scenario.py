@@ -19,10 +19,10 @@ from springline.codegen.numbers import doubles
 from springline.codegen.program import program
 from springline.model.base import COORDINATES, shortest
 from springline.model.base_motion import MOTIONS, moving_terms
-from springline.model.control import CONTROLLERS, LAWS, LogForm, SurfaceExponents
+from springline.model.control import CONTROLLERS, INPUT, LAWS, OBSERVERS, LogForm, ObserverInput, SurfaceExponents
 from springline.model.drive import DRIVES, FRICTION, DriveKind
 from springline.model.mechanisms import MECHANISMS, Implausible
-from springline.model.structure import MotorStart, SignalKind, SignalShape, Structure
+from springline.model.structure import Feedforward, MotorStart, SignalKind, SignalShape, Structure
 from springline.model.system import System, system_of
 from springline.runner.files import InputError, Problem, document_text, read_toml, shortened, unknown
 from springline.runner.scenario import schema
@@ -162,6 +162,9 @@ class Scenario:
             mechanism=mechanism,
             law=self.registered(control["law"]),
             controller=self.registered(control["controller"]),
+            observer=self.registered(control["observer"]),
+            observer_input=cast(ObserverInput, self._observer_input),
+            feedforward=cast(Feedforward, control["feedforward"]),
             log_form=cast(LogForm, control["log_form"]),
             exponents=SurfaceExponents(**{name: control[name] for name in ("l", "m", "p", "r")}),
             reference=_shape(self.document["reference"], joints),
@@ -182,6 +185,12 @@ class Scenario:
         given = (self.document["drive"].get(name), self.document["plant"].get(name))
         return any(number for value in given for _, number in flat(value) if not isinstance(value, dict))
 
+    @property
+    def _observer_input(self) -> str:
+        """What drives the observer; what there is no choice of is the first of its inputs."""
+        observer = OBSERVERS[self.registered(self.document["control"]["observer"])]
+        return str(self.document["control"].get(observer.name, {}).get(INPUT, observer.inputs[0]))
+
     def _base_motion(self) -> SignalShape:
         table = self.document["base_motion"]
         own = self.registered(table["kind"])
@@ -189,6 +198,11 @@ class Scenario:
             return SignalShape("own", shortest(moving_terms(MOTIONS[own])), own)
         shape = _shape(table, [c.key for c in COORDINATES])
         return replace(shape, terms=shortest(shape.terms))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the theory of its controller does not cover, a sentence each, for people."""
+        return self.system().unmet(self.values())
 
     def system(self) -> System:
         """The System of the structure; the same object for equal structures."""
@@ -450,7 +464,7 @@ class Scenario:
                 document[table] = {"kind": kind} | stays
         if overrides.get("control.mode") == "continuous":
             document["control"].pop("period", None)
-        for name, registry in (("controller", CONTROLLERS), ("law", LAWS)):
+        for name, registry in (("controller", CONTROLLERS), ("law", LAWS), ("observer", OBSERVERS)):
             old = document["control"][name]
             if overrides.get(f"control.{name}", old) != old:
                 document["control"].pop(registry[self.registered(old)].name, None)
@@ -465,7 +479,12 @@ class Scenario:
         elif drive in DRIVES and drive != document["drive"]["kind"]:
             structure = self.structure()
             shape = schema.schema(
-                structure.mechanism, cast(DriveKind, drive), structure.controller, structure.law, structure.size
+                structure.mechanism,
+                cast(DriveKind, drive),
+                structure.controller,
+                structure.law,
+                structure.size,
+                observer=structure.observer,
             )
             sections = {name: shape.sections[name] for name in ("plant", "control", "initial")}
             for name, section in (sections | {"drive": shape.kinds["drive"][str(drive)]}).items():

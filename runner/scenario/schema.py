@@ -18,13 +18,13 @@ from springline.codegen.kernel import MOST_STEPS
 from springline.codegen.numbers import double
 from springline.model.base import COORDINATES, MOUNT, MOUNT_RPY
 from springline.model.base_motion import MOTIONS
-from springline.model.control import CONTROLLERS, LARGEST_SURFACE_EXPONENT, LAWS, LogForm
+from springline.model.control import CONTROLLERS, INPUT, LARGEST_SURFACE_EXPONENT, LAWS, OBSERVERS, LogForm
 from springline.model.drive import DRIVES, EPSILON, DriveKind, friction_parameters
 from springline.model.integrators import INTEGRATORS
 from springline.model.mechanisms import MECHANISMS, Mechanism
 from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
 from springline.model.registry import Registry
-from springline.model.structure import Structure
+from springline.model.structure import Feedforward, Structure
 from springline.model.system import control_parameters, own_control_tables
 from springline.runner.files import Problem, unknown, value_text
 from springline.runner.scenario.signal_csv import UNITS
@@ -290,6 +290,8 @@ class ControlStructure(Section):
     """The keys of [control] that are no numbers of the model."""
 
     controller: Annotated[str, door("controller", CONTROLLERS)] = _DEFAULT.controller
+    observer: Annotated[str, door("observer", OBSERVERS)] = _DEFAULT.observer
+    feedforward: Annotated[str, choice("feedforward", get_args(Feedforward))] = _DEFAULT.feedforward
     law: Annotated[str, door("law", LAWS)] = _DEFAULT.law
     log_form: Annotated[str, choice("log_form", get_args(LogForm))] = _DEFAULT.log_form
     l: Annotated[int, _EXPONENT] = _DEFAULT.exponents.l  # noqa: E741 - the paper's letter
@@ -342,6 +344,7 @@ DEFAULT_KINDS = {"drive": "elastic", "reference": "sine", "base_motion": "none",
 DOORS: Mapping[tuple[str, str], tuple[Registry[Any], str]] = {
     ("mechanism", "name"): (MECHANISMS, _DEFAULT.mechanism),
     ("control", "controller"): (CONTROLLERS, _DEFAULT.controller),
+    ("control", "observer"): (OBSERVERS, _DEFAULT.observer),
     ("control", "law"): (LAWS, _DEFAULT.law),
     ("base_motion", "kind"): (MOTIONS, _DEFAULT.base_motion.kind),
 }
@@ -358,12 +361,13 @@ def schema(
     law: str = _DEFAULT.law,
     size: int = 0,
     motion: str = "",
+    observer: str = _DEFAULT.observer,
 ) -> Schema:
-    """The schema for the mechanism, kind of drive, controller and law that are registered as such.
+    """The schema for the mechanism, kind of drive, controller, law and observer that are registered as such.
 
     size    how many joints the mechanism has, 0 for as many as it has by default
     motion  what a base motion of a user's own is registered as, which is then a kind too; "" if there is none
-    Raises ValueError for a controller or law whose table [control.<its name>] would be a key that there is already.
+    Raises ValueError for a controller, law or observer whose table [control.<its name>] would be a key already.
     """
     mechanism = MECHANISMS[name].of_size(size)
     joints = mechanism.joints
@@ -371,10 +375,11 @@ def schema(
     named = (Annotated[str, door("mechanism", MECHANISMS)], name)
     limits = (Annotated[Any, joint_limits(joints)], [list(pair) for pair in mechanism.limits] or None)
     shared = _numbers(control_parameters(mechanism, drive), joints)
-    own = own_control_tables(Structure(name, law, drive=drive, controller=controller, size=size))
+    own = own_control_tables(Structure(name, law, drive=drive, controller=controller, size=size, observer=observer))
     for taken in own:
         if taken in shared or taken in ControlStructure.model_fields:
             raise ValueError(f"{taken!r} is a key of [control] already: give the class another name")
+    tables = _own_tables(own, joints, _inputs(observer, drive))
     position, rate = (_each("{q}", REAL, joints), _each("{q}/s", REAL, joints))
     initial = {
         "q": (Annotated[Any, position], list(mechanism.start_position)),
@@ -390,7 +395,7 @@ def schema(
                 "mechanism", {"name": named, **_size(mechanism), "limits": limits, **_numbers(arm, joints)}
             ),
             "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *moving)}),
-            "control": _section("control", shared | _own_tables(own, joints), ControlStructure),
+            "control": _section("control", shared | tables, ControlStructure),
             "initial": _section("initial", initial),
             "simulation": Simulation,
         },
@@ -436,9 +441,22 @@ def _base_motion_sections(motion: str, joints: Sequence[Joint]) -> dict[str, typ
     return sections
 
 
-def _own_tables(own: Mapping[str, Iterable[Parameter]], joints: Sequence[Joint]) -> dict[str, Any]:
-    """Fields of the tables [control.<name>]."""
-    sections = {name: _section(name, _numbers(parameters, joints)) for name, parameters in own.items()}
+def _inputs(observer: str, drive: DriveKind) -> Mapping[str, Any]:
+    """The key of an observer's table for what drives it: the springs do where there are some."""
+    found = OBSERVERS[observer]
+    names = [name for name in found.inputs if drive == "elastic" or name != "spring"] or ["command"]
+    keys = {INPUT: (Annotated[str, choice("input", names)], names[0])} if len(found.inputs) > 1 else {}
+    return {found.name: keys}
+
+
+def _own_tables(
+    own: Mapping[str, Iterable[Parameter]], joints: Sequence[Joint], others: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Fields of the tables [control.<name>]; `others` has by table what is no number."""
+    sections = {
+        name: _section(name, {**others.get(name, {}), **_numbers(parameters, joints)})
+        for name, parameters in own.items()
+    }
     return {name: (made, made.model_validate({})) for name, made in sections.items()}
 
 

@@ -328,6 +328,7 @@ def _blamed(error: BaseException, users: Mapping[UserClass, str]) -> UserClass:
         "mechanism.name": "mechanism",
         "control.law": "law",
         "control.controller": "controller",
+        "control.observer": "observer",
         "base_motion.kind": "base motion",
     }
     lines = [user for user in users if _lines(error, user)]

@@ -69,7 +69,7 @@ class TypedInterface:
         numbers = declared(E, *system.sliding, *system.command_parts)
         limits = (SATURATED, A_LIMITED) if system.controller.law else (SATURATED,)
         self.structures: dict[str, tuple[Field, ...]] = {
-            "reference": declared(*REFERENCE),
+            "reference": declared(*REFERENCE, *system.measured_base),
             "measurement": tuple(f for k, f in enumerate(declared(*system.drive.state)) if ("x", k) in read),
             "command": declared(U),
             "diagnostics": (*numbers, *declared(*limits, integer=True)),
@@ -85,12 +85,13 @@ class TypedInterface:
         self.derived = self._printer.derived
 
         state, base = self.structures["state"], self.structures["base"]
-        reference, command = self.structures["reference"], self.structures["command"]
-        signals = [f"reference->{f.name}" for f in reference] + [f"base->{f.name}" for f in base]
+        command = self.structures["command"]
+        signals = [f"reference->{f.name}" for f in declared(*REFERENCE)] + [f"base->{f.name}" for f in base]
         first = (1 + len(system.sliding)) * system.n  # of the command's parts
         seen = [f"diagnostics->{f.name}" for f in (*numbers[first:], *numbers[:first])]
         seen += [f"ahead->{f.name}" for f in self.structures.get("memory", ())]
         seeing = dict.fromkeys(("q1d", "dq1d", "ddq1d"), "reference->") | {"x": "measurement->", "z": _MEMORY}
+        seeing |= dict.fromkeys(("b", "db", "ddb"), "reference->measured_")
         measured = {field.name for field in self.structures["measurement"]}
         around = dict.fromkeys(("b", "db", "ddb", DISTURBANCE.name), "base->")
         self.bodies: dict[str, Body] = {
@@ -185,6 +186,12 @@ class TypedInterface:
     def reads_tables(self, name: str) -> bool:
         """Whether body `name` needs data of the exported tables."""
         return any(source == "d" for source, _ in self._printer.reads(name))
+
+    @property
+    def measured_base(self) -> list[str]:
+        """Names of the base's motion that the controller is told of, by "measured_<name>" of its reference."""
+        system = self.export.system
+        return [entry.name for entry in entries(system.base_motion, system.joints)] if system.measured_base else []
 
     @property
     def missing_tables(self) -> str:

@@ -82,6 +82,7 @@ def _values(export: Export, interface: TypedInterface) -> dict[str, Any]:
         "tables": len(export.tables),
         "table_data": system.d.numel(),
         "of_tables": [name for name in interface.bodies if interface.reads_tables(name)],
+        "measured_base": interface.measured_base,
         "missing_tables": interface.missing_tables,
         "timing": _timing(export),
     }
@@ -124,7 +125,8 @@ def _self_check(export: Export, interface: TypedInterface) -> dict[str, Any]:
 
     diagnostics = outputs[n : len(outputs) - len(memory)]
     casts = [f"({export.prefix}_real)" if name in integers else "" for name in diagnostics]
-    first = 3 * n  # of what is measured, behind the reference
+    first = len(structures["reference"])  # of what is measured, behind the reference
+    fed = [f"in + {k}" for k in range(3 * n, first, system.base.b.numel())]
     z = [f"in + {first + len(measured)}"] if memory else []
     return {
         "bits": 32 if export.real == "float" else 64,
@@ -139,7 +141,7 @@ def _self_check(export: Export, interface: TypedInterface) -> dict[str, Any]:
         "plant_in": places(base="base[0].", state="state.", command="command."),
         # The model's control gives the command, its parts, error, and sigma where there is one.
         "model_parts": 2 + len(system.command_parts) + len(system.sliding),
-        "model_arguments": ["in", f"in + {n}", f"in + {2 * n}", "x", *z, *(["p"] if export.tunable else [])],
+        "model_arguments": ["in", f"in + {n}", f"in + {2 * n}", *fed, "x", *z, *(["p"] if export.tunable else [])],
         "measured_places": [(states.index(name), first + k) for k, name in enumerate(measured)],
     }
 

@@ -164,18 +164,29 @@ def _control_rows(interface: TypedInterface, model: _Model) -> Numbers:
     q1d, dq1d, _, error, rate, stretching = np.split(drawn, 6, axis=1)
     q1, dq1 = q1d - error, dq1d - rate
     reference = drawn[:, : 3 * n].astype(model.dtype)
+    base = _measured_base(interface, draw).astype(model.dtype)
     x = np.hstack([q1, dq1, q1, dq1 + stretching]).astype(model.dtype)[:, : system.x.numel()]
     # The vectors are a sequence: what a sample leaves in z, the next one takes.
     z = np.tile(np.array(system.z_start, model.dtype), (CONTROL_VECTORS + 1, 1))
     before, after = z[:-1], z[1:]
-    seen = [*np.split(reference, 3, axis=1), x, *([before] if system.memory else [])]
+    fed = np.split(base, 3, axis=1) if base.size else []
+    seen = [*np.split(reference, 3, axis=1), *fed, x, *([before] if system.memory else [])]
     if system.memory:
         model("update", *seen, np.array([interface.export.period]), into=[after])
     outputs = model("control", *seen)
     names = {field.name for field in interface.structures["measurement"]}
     measured = [k for k, field in enumerate(interface.structures["state"]) if field.name in names]
     flags = _limits_met(interface.export, model, outputs)
-    return np.hstack([reference, x[:, measured], before, *outputs, *flags, after])
+    return np.hstack([reference, base, x[:, measured], before, *outputs, *flags, after])
+
+
+def _measured_base(interface: TypedInterface, draw: _Draw) -> Numbers:
+    """The base's motion that a controller is told of, a row per vector; no column where it is told of none."""
+    size = len(interface.measured_base) // 3
+    rows = (
+        [*draw.uniform(0.5, size), *draw.uniform(1.0, size), *draw.uniform(2.0, size)] for _ in range(CONTROL_VECTORS)
+    )
+    return np.array(list(rows)).reshape(CONTROL_VECTORS, 3 * size)
 
 
 def _limits_met(export: Export, model: _Model, outputs: Sequence[Numbers]) -> Iterator[Numbers]:

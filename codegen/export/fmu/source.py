@@ -78,6 +78,7 @@ def _values(export: Export, typed: TypedInterface, interface: Interface, setting
         "no_limit": constant_expression(NO_LIMIT),
         "hold": settings.hold,
         "base_is_input": base_is_input(system, part),
+        "measured_base": typed.measured_base,
         "force_is_input": force_is_input(system, part),
         "tip": typed.tip,
         "limits": [[constant_expression(value) for value in pair] for pair in settings.limits],

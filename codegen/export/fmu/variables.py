@@ -79,7 +79,7 @@ class Interface:
     """Variables of one part.
 
     variables  by value reference; 0 is time
-    base       how many variables say how the base moves
+    base       how many variables say how the base moves;  fed: whether the controller is told of it
     blocks     name of a structure of the C interface (or "parameters") -> value reference of its first entry; entries
                follow in the structure's order
     """
@@ -88,20 +88,22 @@ class Interface:
     variables: tuple[Variable, ...]
     blocks: dict[str, int]
     base: int = 0
+    fed: bool = False
 
     @property
     def depends(self) -> dict[int, list[int]]:
         """Value reference of each output -> those of the inputs of its own time that it depends on.
 
         The command depends on all; of the plant, whose other outputs are states, the tip as seen from the earth depends
-        on the base.
+        on the base. Of the loop, what the controller computes does where it is told how the base moves.
         """
         inputs = self.of("input")
         if self.part == "controller":
             return dict.fromkeys(self.of("output"), inputs)
         seen = range(self.blocks["base"], self.blocks["base"] + self.base) if "base" in self.blocks else ()
         moving = [k for k in inputs if k in seen]
-        return {k: moving if self.variables[k].name in _SEEN_FROM_EARTH else [] for k in self.of("output")}
+        told = range(self.blocks["reference"], len(self.variables)) if self.fed and self.part == "loop" else ()
+        return {k: moving if k in told or self.variables[k].name in _SEEN_FROM_EARTH else [] for k in self.of("output")}
 
     def of(self, *causalities: Causality) -> list[int]:
         """Value references of the variables with one of these causalities."""
@@ -192,7 +194,7 @@ def interface(export: Export, typed: TypedInterface, part: Part, *, sampled: boo
             if structure == last and "memory" in typed.structures:
                 blocks["memory"] = len(variables)
                 variables += [_signal(field, "local", sampled=sampled) for field in typed.structures["memory"]]
-    return Interface(part, tuple(variables), blocks, len(known["base"]))
+    return Interface(part, tuple(variables), blocks, len(known["base"]), bool(typed.measured_base))
 
 
 def _signal(field: Field, causality: Causality, *, sampled: bool = False) -> Variable:

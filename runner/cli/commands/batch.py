@@ -71,7 +71,7 @@ def batch(
     )
 
     loaded = load_sweep(sweep, overrides(changes, sweep))
-    for note in loaded.scenario.notes:
+    for note in (*loaded.scenario.notes, *loaded.scenario.warnings):
         complain(note)
     plan = Plan(loaded)
     plan.expect_plausible()

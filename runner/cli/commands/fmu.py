@@ -104,7 +104,7 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         manifest = {"kind": _KIND, "fmus": sorted([*others.values(), entry], key=lambda fmu: str(fmu["name"]))}
         written = write_tree(output, {**kept, path: content}, manifest, force=force).written
         done = "written" if path in written else "unchanged"
-        for note in loaded.notes if part is not Part.controller else ():
+        for note in (*(loaded.notes if part is not Part.controller else ()), *loaded.warnings):
             complain(note)
         if as_json:
             print_json(f"export fmu{version}", [{"path": path, "change": done}], {})

@@ -86,7 +86,7 @@ def run(
     files |= table_files("trajectory", result.trajectory, form.value)
     files |= table_files("metrics", result.metrics, form.value)
     write_folder(folder, files, replaces=OUTPUTS)
-    for note in loaded.notes:
+    for note in (*loaded.notes, *loaded.warnings):
         complain(note)
     sha256 = {"sha256": trajectory_hash(result.trajectory)} if with_hash else {}
     if as_json:

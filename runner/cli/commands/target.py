@@ -23,7 +23,7 @@ from springline.runner.cli.options import (
     refuse_results,
     tunable_names,
 )
-from springline.runner.cli.terminal import print_json, say
+from springline.runner.cli.terminal import complain, print_json, say
 from springline.runner.files import InputError, Problem
 
 if TYPE_CHECKING:
@@ -89,6 +89,8 @@ def tree_command(
 
         expect_folder(output, writable=not check)
         loaded = load_scenario(scenario, overrides(changes, scenario))
+        for warning in loaded.warnings:
+            complain(warning)
         names = tunable_names(tunable)
         try:
             period = max(loaded.control_every, 1) * loaded.step

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from springline.model.control import LAWS
+from springline.model.control import CONTROLLERS, LAWS
 from springline.model.parameters import Bounds
 from springline.model.structure import SignalShape, Structure
 from springline.runner.files import InputError, value_text
@@ -71,7 +71,8 @@ def slots(scenario: Scenario) -> dict[str, float]:
 
 
 def test_the_packaged_scenarios_are_those_of_the_design() -> None:
-    assert set(packaged_scenarios()) == {*GROUPS, "paper/nominal", "paper/as_printed", "ship/vessel_10hz"}
+    rivals = {f"controllers/{name}" for name in CONTROLLERS if name != "terminal_sliding"}
+    assert set(packaged_scenarios()) == {*GROUPS, *rivals, "paper/nominal", "paper/as_printed", "ship/vessel_10hz"}
 
 
 def test_an_empty_file_is_the_paper_s_nominal(load) -> None:

@@ -299,7 +299,7 @@ def test_packaged_sweeps_are_valid(name: str) -> None:
 
 
 def test_the_packaged_sweeps_are_those_of_the_documentation() -> None:
-    assert packaged_sweeps() == ("gains", "laws", "payload_and_phase", "stability_map")
+    assert packaged_sweeps() == ("controllers", "gains", "laws", "payload_and_phase", "stability_map")
 
 
 # --- mistakes --------------------------------------------------------------------------------------------
