@@ -14,29 +14,43 @@ springline_state, set by springline_start and moved on by springline_plant_step.
 line of a delay is moved on once a step, at its end: it is no part of the differential equation, so in the loop it
 stands where a sampled controller's z does, behind the states that are integrated. No effect that remembers is there
 yet.
+
+Random numbers are no state: they follow from a seed and from the numbers of run, sample and channel, which is the place
+in the state of what they are added to. Functions take them as an input, noise; codegen/runtime/sl_noise.h makes them,
+for both engines and all that is exported.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import ClassVar
 
 import casadi as ca
 
-from springline.model.quantities import Quantity
+from springline.model.parameters import NON_NEGATIVE, Parameter, Values
+from springline.model.quantities import DQ1, DQ2, Q1, Q2, Quantity
 
 Measured = Mapping[Quantity, ca.SX]
+
+POSITIONS, RATES = (Q1, Q2), (DQ1, DQ2)
 
 
 class Effect:
     """One property of real sensors or motors; a subclass overrides what it changes.
 
-    name  in a Structure
+    name        in a Structure
+    parameters  its numbers, keys of [sensor]; it is there where one of them is not zero
+    sampled     whether it is one of samples, which continuous control has none of
+    noisy       whether it takes a random number for each quantity of the state and each sample
     """
 
-    name: str
+    name: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    sampled: ClassVar[bool] = False
+    noisy: ClassVar[bool] = False
 
-    def sense(self, y: Measured) -> Measured:
-        """What is shown in place of y, n x 1 each."""
+    def sense(self, y: Measured, p: Values, noise: Measured) -> Measured:
+        """What is shown in place of y, n x 1 each; noise: standard normal numbers, empty where no effect is noisy."""
         return y
 
     def delay(self, u: ca.SX) -> ca.SX:
@@ -48,13 +62,65 @@ class Effect:
         return u
 
 
-EFFECTS: dict[str, Effect] = {}
+class PositionNoise(Effect):
+    """White noise on what encoders show."""
+
+    name, sampled, noisy = "position_noise", True, True
+    parameters = (
+        Parameter("position_noise", "{q}", 0.0, "standard deviation of a measured position", NON_NEGATIVE, True),
+    )
+
+    def sense(self, y: Measured, p: Values, noise: Measured) -> Measured:
+        """Joints and motors alike."""
+        return {
+            item: value + p.position_noise * noise[item] if item in POSITIONS else value for item, value in y.items()
+        }
 
 
-def sensed(names: Iterable[str], y: Measured) -> Measured:
+class VelocityNoise(Effect):
+    """White noise on measured rates."""
+
+    name, sampled, noisy = "velocity_noise", True, True
+    parameters = (
+        Parameter("velocity_noise", "{q}/s", 0.0, "standard deviation of a measured rate", NON_NEGATIVE, True),
+    )
+
+    def sense(self, y: Measured, p: Values, noise: Measured) -> Measured:
+        """Joints and motors alike."""
+        return {item: value + p.velocity_noise * noise[item] if item in RATES else value for item, value in y.items()}
+
+
+class PositionResolution(Effect):
+    """Encoders show the nearest of their steps."""
+
+    name, sampled = "position_resolution", True
+    parameters = (
+        Parameter(
+            "position_resolution", "{q}", 0.0, "step between two positions that can be shown", NON_NEGATIVE, True
+        ),
+    )
+
+    def sense(self, y: Measured, p: Values, noise: Measured) -> Measured:
+        """Joints and motors alike; a joint of resolution 0 shows its position as it is."""
+        step = p.position_resolution
+        safe = step + (step == 0.0)  # not to divide by zero, whose guard would still let NaN be computed
+
+        def shown(value: ca.SX) -> ca.SX:
+            return ca.if_else(step > 0.0, step * ca.floor(value / safe + 0.5), value)
+
+        return {item: shown(value) if item in POSITIONS else value for item, value in y.items()}
+
+
+SENSORS: tuple[Effect, ...] = (PositionNoise(), VelocityNoise(), PositionResolution())
+"""What [sensor] has, in the order in which it acts: an encoder's steps are of what noise has moved."""
+
+EFFECTS: dict[str, Effect] = {effect.name: effect for effect in SENSORS}
+
+
+def sensed(names: Iterable[str], y: Measured, p: Values, noise: Measured) -> Measured:
     """The state as the controller sees it."""
     for name in names:
-        y = EFFECTS[name].sense(y)
+        y = EFFECTS[name].sense(y, p, noise)
     return y
 
 

@@ -148,7 +148,7 @@ class _Emitter:
         """C expression of an input, or of a value from an earlier binding time, for group g of runs."""
         node = self.graph.nodes[i]
         name, k = node.source
-        if name in ("p", "x", "u"):
+        if name in ("p", "x", "u", "noise"):
             return f"{name}[{k}][g]"
         if name == "z":  # behind the plant's state
             return f"x[{self.program.size('x') + k}][g]"
@@ -223,7 +223,10 @@ class _Emitter:
         memory = self.program.size("z")
         now = "sl_time now, const sl_group *x"
         control = {"u": n, "e": n, "sigma": n, "wished": n, "a_law": n}
-        sampling, sample = (f"{now}, double period", control | {"ahead": memory}) if memory else (now, control)
+        measured = self.program.size("measured")
+        sampling = f"{now}, const sl_group *noise" if measured else now
+        sample = control | ({"measured": measured} if measured else {}) | ({"ahead": memory} if memory else {})
+        sampling += ", double period" if memory else ""
         begun = [*outputs["start"][0], *map(self.graph.constant, self.program.system.z_start)]
         at_time = f"double time, const double *data, {_GIVEN}"
         at_row = f"double time, const double *data, const sl_group *x, {_GIVEN}, sl_group *tip"
@@ -264,7 +267,7 @@ class _Emitter:
         return "\n".join([
             *parts,
             "/* ---- at every evaluation, where a block does not hold ---- */\n",
-            self._complete("closed", now, {"dx": states + memory, **control}),
+            *([] if measured else [self._complete("closed", now, {"dx": states + memory, **control})]),
             self._complete("control", sampling, sample),
             self._complete("error", now, {"e": n, "sigma": n}),
             self._complete("plant", f"{now}, const sl_group *u", {"dx": states}),

@@ -19,6 +19,8 @@ from springline.codegen.program import Binding, kept_slopes, literal, updates
 
 _SHOWN = ("u", "e", "sigma", "wished", "a_law")
 
+_SENSORS = ", const sl_group *restrict noise, sl_group *restrict measured"
+
 PREAMBLE = """\
 /* A block takes the packs through a part of a step, in the common case; it returns 0 where a lane meets a rare one, and
  * what it has written is then to be computed again by the complete functions. `times` and `gains` are those of its
@@ -28,7 +30,7 @@ PREAMBLE = """\
   const sl_time *times, const sl_v *restrict gains, double period, const sl_group *restrict p, \\
       const sl_group *restrict r, const sl_group *restrict x, const sl_group *restrict from, sl_group *restrict next, \\
       sl_group *restrict at, sl_group (*restrict kept)[SL_NX], sl_group *restrict slope, sl_group *restrict u, \\
-      sl_group *restrict e, sl_group *restrict sigma, sl_group *restrict wished, sl_group *restrict a_law
+      sl_group *restrict e, sl_group *restrict sigma, sl_group *restrict wished, sl_group *restrict a_law@SENSORS
 
 typedef struct {
   int (*compute)(SL_BLOCK_ARGUMENTS);
@@ -95,7 +97,7 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int], Shape]
     text = [
         "/* ---- a step, block by block ---- */\n",
         "#define SL_BLOCKED 1",
-        PREAMBLE,
+        PREAMBLE.replace("@SENSORS", f"{_SENSORS}" if builder.measured else ""),
         *constants.text(chosen.groups),
         *text,
         f"#define SL_FUSED {fused} /* whether blocks sum up the next state, too */",
@@ -120,6 +122,7 @@ class _Builder:
         program = values.program
         self.tableau = program.system.tableau
         self.n, self.plant, self.memory = program.system.n, program.size("x"), program.size("z")
+        self.measured = program.size("measured")
         self.integrated = self.plant + (0 if sampled else self.memory)
 
     def evaluation(self, stage: int, variant: str) -> Block:
@@ -192,7 +195,9 @@ class _Stages:
             places = self.expansion.values(wanted["control"], where, instant)
             self._show(_SHOWN, places[: 5 * n])
             self.command = places[:n]
-            block.stores += [(f"next[{plant + k}][@]", place) for k, place in enumerate(places[5 * n :])]
+            shown, ahead = places[5 * n : 5 * n + builder.measured], places[5 * n + builder.measured :]
+            block.stores += [(f"measured[{k}][@]", place) for k, place in enumerate(shown)]
+            block.stores += [(f"next[{plant + k}][@]", place) for k, place in enumerate(ahead)]
         elif variant == "held":
             self._show(("e", "sigma"), self.expansion.values(wanted["error"], where, instant))
             held = [(f"next[{plant + k}][@]", block.load(f"x[{plant + k}][@]")) for k in range(memory)]
@@ -212,6 +217,8 @@ class _Stages:
             return f"p[{k}][@]"
         if source == "z":  # with sampled control: held over the step
             return f"x[{self.builder.plant + k}][@]"
+        if source == "noise":
+            return f"noise[{k}][@]"
         if source == "h":
             return "slv_set(period)"
         if node.binding is Binding.RUN:

@@ -9,6 +9,8 @@
  *                SL_NTABLES; SL_SAMPLED, SL_SLIDING (whether the controller has a sliding variable) 0 or 1
  *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals; kernel_tip, for rows alone, where SL_NTIP > 0
  *   the metrics: SL_METRICS_PER_JOINT, sl_sample, sl_metrics, kernel_sample, kernel_metrics_start, _sample and _finish
+ *   SL_NMEASURED, SL_NNOISE, where sensors show at samples anything but the state: numbers that they show, and random
+ *                numbers that they take
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
  *                needed for long), sl_node, sl_when, sl_kept, kernel_update
@@ -25,13 +27,30 @@
 #include "kernel.h"
 #include "simulate.h"
 
+#ifndef SL_NMEASURED
+#define SL_NMEASURED 0
+#define SL_NNOISE 0
+#endif
+#if SL_NNOISE > 0
+#include "sl_noise.h"
+#endif
+#if SL_NMEASURED > 0
+#define SL_NOISE_GIVEN (const sl_group *)pack->noise,
+#define SL_MEASURED_TAKEN , pack->measured
+#define SL_MEASURED_TAKEN_BY_BLOCK , (const sl_group *)pack->noise, pack->measured
+#else
+#define SL_NOISE_GIVEN
+#define SL_MEASURED_TAKEN
+#define SL_MEASURED_TAKEN_BY_BLOCK
+#endif
+
 enum {
   SL_PACK = SL_W * SL_G,
   SL_NMETRICS = SL_NJ * SL_METRICS_PER_JOINT,
   SL_BLOCK = (SL_INSTANTS + SL_W - 1) / SL_W * SL_W, /* instants whose uniform signals are evaluated together */
   SL_NPLANT = SL_NX - SL_NZ,
   SL_NSIGMA = SL_NJ * SL_SLIDING,
-  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB + SL_NF + SL_NTIP
+  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB + SL_NF + SL_NTIP + SL_NMEASURED
 };
 
 /* ---- signals ------------------------------------------------------------------------------------------- */
@@ -88,6 +107,12 @@ typedef struct {
   sl_time times[SL_INSTANTS + 1];                 /* the nodes of the step, and its end */
   sl_group varying[SL_INSTANTS + 1][SL_NV + 1];   /* what varies at these times, in turn */
   sl_group low[SL_NJ], high[SL_NJ]; /* limits of q1, where the job has some; those of a lane that has ended are none */
+#if SL_NMEASURED > 0
+  sl_group noise[SL_NNOISE + 1], measured[SL_NMEASURED]; /* of the last sample */
+#endif
+#if SL_NNOISE > 0
+  sl_b number[SL_G]; /* that the noise of a run goes by */
+#endif
   int64_t samples;                  /* that the metrics have seen */
   sl_metrics metrics[SL_NJ][SL_G];
   sl_clock *clock;
@@ -139,6 +164,9 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
     for (i = 0; i < SL_NB + SL_NF; i++) *row++ = lane_of(b[i], lane);
 #if SL_NTIP > 0
     for (i = 0; i < SL_NTIP; i++) *row++ = lane_of(tip[i], lane);
+#endif
+#if SL_NMEASURED > 0
+    for (i = 0; i < SL_NMEASURED; i++) *row++ = lane_of(pack->measured[i], lane);
 #endif
   }
 }
@@ -262,16 +290,34 @@ static void observe(sl_pack *pack, int64_t k, sl_time now) {
 }
 
 #if SL_SAMPLED
+#if SL_NNOISE > 0
+/* Random numbers of step k, where that is a sample. */
+static void draw_noise(sl_pack *pack, int64_t k) {
+  const sl_b none = {0};
+  int block, i, g;
+  if (k % pack->job->hold != 0) return;
+  for (g = 0; g < SL_G; g++) {
+    for (block = 0; 4 * block < SL_NNOISE; block++) {
+      sl_v z[4];
+      slv_noise(none + (uint64_t)pack->job->seed, pack->number[g], none + (uint64_t)(k / pack->job->hold),
+                none + (uint64_t)block, z);
+      for (i = 0; i < 4 && 4 * block + i < SL_NNOISE; i++) pack->noise[4 * block + i][g] = z[i];
+    }
+  }
+}
+#endif
+
 /* Control of step k: a new sample, or the held one with its error and sliding variable. */
 static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
   const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
   if (k % pack->job->hold == 0) {
 #if SL_NZ > 0
     const double period = (double)pack->job->hold * pack->job->step;
-    kernel_control(now, x, period, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law,
-                   pack->next + SL_NPLANT);
+    kernel_control(now, x, SL_NOISE_GIVEN period, p, r, pack->u, pack->e, pack->sigma, pack->wished,
+                   pack->a_law SL_MEASURED_TAKEN, pack->next + SL_NPLANT);
 #else
-    kernel_control(now, x, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
+    kernel_control(now, x, SL_NOISE_GIVEN p, r, pack->u, pack->e, pack->sigma, pack->wished,
+                   pack->a_law SL_MEASURED_TAKEN);
 #endif
   } else {
     kernel_error(now, x, p, r, pack->e, pack->sigma);
@@ -305,6 +351,9 @@ static void run_block(sl_pack *pack, int64_t k, int block) {
   const sl_group *x = (const sl_group *)pack->x;
   sl_group *from = pack->at[block & 1], *to = pack->at[(block + 1) & 1], once[SL_NX];
   int stage = block * SL_PER_BLOCK, end = stage + SL_PER_BLOCK, fine = 0;
+#if SL_NNOISE > 0
+  if (block == 0) draw_noise(pack, k);
+#endif
 #if SL_BLOCKED
   const sl_block *chosen = SL_SAMPLED && block == 0 && k % pack->job->hold != 0 ? &SL_HELD : &sl_blocks[block];
   const int seen = block == 0 || SL_SAMPLED; /* what later stages compute of the control is only theirs */
@@ -314,7 +363,7 @@ static void run_block(sl_pack *pack, int64_t k, int block) {
                          pack->kept, sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]],
                          seen ? pack->u : pack->unseen[0], seen ? pack->e : pack->unseen[1],
                          seen ? pack->sigma : pack->unseen[2], seen ? pack->wished : pack->unseen[3],
-                         seen ? pack->a_law : pack->unseen[4]);
+                         seen ? pack->a_law : pack->unseen[4] SL_MEASURED_TAKEN_BY_BLOCK);
 #endif
   if (!SL_LIKELY(fine && SL_FUSED)) {
     for (; stage < end; stage++, from = to) {
@@ -329,6 +378,9 @@ static void run_block(sl_pack *pack, int64_t k, int block) {
 /* e, sigma and u at the end of the run. */
 static void control_at_end(sl_pack *pack, int64_t k, sl_time now) {
 #if SL_SAMPLED
+#if SL_NNOISE > 0
+  draw_noise(pack, k);
+#endif
   sample_control(pack, k, now);
 #else
   sl_group slope[SL_NX];
@@ -354,6 +406,9 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
     pack->alive[lane] = lane < pack->lanes;
     for (i = 0; i < SL_NP; i++) set_lane(pack->p[i], lane, job->parameters[run * SL_NP + i]);
     if (lane < pack->lanes && job->rows) job->rows[run] = 0;
+#if SL_NNOISE > 0
+    SL_LANE(pack->number[lane / SL_W], lane % SL_W) = job->numbers ? (uint64_t)job->numbers[run] : 0;
+#endif
     if (job->limits) set_limits(pack, lane, lane < pack->lanes ? job->limits : NULL);
   }
 #if SL_BLOCKED

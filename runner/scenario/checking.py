@@ -14,6 +14,7 @@ import numpy as np
 from springline.codegen.kernel import MOST_STEPS
 from springline.model.base import ALIASES, COORDINATES
 from springline.model.drive import DRIVES, DriveKind
+from springline.model.hardware import SENSORS
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE
 from springline.runner.files import InputError, Problem, unknown
@@ -90,6 +91,7 @@ def resolve(
     problems += _via_point_problems(document["reference"], where)
     problems += _exponent_problems(document["control"], where)
     problems += _sampling_problems(document, given["control"], where)
+    problems += _sensor_problems(document, where)
     problems += _whole_problems(document, "simulation.duration", where)
     duration = document["simulation"].get("duration")
     units = {
@@ -283,6 +285,19 @@ def _sampling_problems(document: Document, given: Mapping[str, object], where: s
     if control.get("mode") != "sampled":  # else a forgotten mode would go unnoticed
         return [Problem(where, key, 'only goes with control.mode = "sampled"', 'mode = "continuous"')]
     return _whole_problems(document, key, where)
+
+
+def _sensor_problems(document: Document, where: str) -> list[Problem]:
+    """What sensors show is of samples, which a continuous control has none of."""
+    control, sensor = document["control"], document["sensor"]
+    if "mode" not in control or control["mode"] == "sampled":
+        return []
+    text = 'only goes with control.mode = "sampled"'
+    return [
+        Problem(where, f"sensor.{effect.name}", text, 'mode = "continuous"')
+        for effect in SENSORS
+        if any(sensor.get(effect.name, ()))
+    ]
 
 
 def _whole_problems(document: Document, key: str, where: str) -> list[Problem]:

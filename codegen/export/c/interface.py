@@ -132,7 +132,7 @@ class TypedInterface:
                 return f"controller->derived[{k}]"
             if name == "p":
                 return f"controller->config.parameters.{symbols[k]}"
-            if (name == "x" and x_is_array) or name == "d":
+            if (name == "x" and x_is_array) or name in ("d", "noise"):
                 return f"{name}[{k}]"
             label = ports[name][k][0]
             return owners[name] + (label.replace("u_", "U_", 1) if name == "u" else label)

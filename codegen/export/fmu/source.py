@@ -80,6 +80,8 @@ def _values(export: Export, typed: TypedInterface, interface: Interface, setting
         "base_is_input": base_is_input(system, part),
         "force_is_input": force_is_input(system, part),
         "tip": typed.tip,
+        "sensed": part != "controller" and bool(system.measured),
+        "noisy": bool(system.noise.numel()),
         "limits": [[constant_expression(value) for value in pair] for pair in settings.limits],
         "memory": len(system.memory) if "memory" in blocks else 0,
         "current": (1 + len(system.sliding)) * system.n,

@@ -124,7 +124,18 @@ def structures_of(typed: TypedInterface) -> dict[str, tuple[Field, ...]]:
     base = typed.structures["base"]
     motion = len(base) - len(entries(system.forces, system.joints))
     tip = tuple(Field(entry.name, entry.unit, entry.meaning) for entry in entries(system.observed, system.joints))
-    return {**typed.structures, "base": base[:motion], "disturbance": base[motion:], "tip": tip if typed.tip else ()}
+    shown = {entry.name: entry for entry in entries(system.measured, system.joints)}
+    places = [f"{quantity.name}_measured_{joint.name}" for quantity in system.drive.state for joint in system.joints]
+    names = dict(zip((field.name for field in typed.structures["state"]), places, strict=True))
+    seen = [names[field.name] for field in typed.structures["measurement"] if names[field.name] in shown]
+    measured = tuple(Field(name, shown[name].unit, shown[name].meaning) for name in seen)
+    return {
+        **typed.structures,
+        "base": base[:motion],
+        "disturbance": base[motion:],
+        "tip": tip if typed.tip else (),
+        "measured": measured,
+    }
 
 
 def part_parameters(system: System, part: Part) -> tuple[int, ...]:
@@ -134,6 +145,7 @@ def part_parameters(system: System, part: Part) -> tuple[int, ...]:
     if part == "controller":
         return tuple(sorted(control))
     used = {*_read(system, "plant"), *_read(system, "start"), *(_read(system, "tip") if system.observed else ())}
+    used |= {*_read(system, "measure")}
     if part == "loop":
         used |= control
     signals = {
@@ -166,6 +178,7 @@ def interface(export: Export, typed: TypedInterface, part: Part, *, sampled: boo
     given = [name for name, is_input in outside.items() if is_input and known[name]]
     shown = [name for name, is_input in outside.items() if not is_input and known[name]]
     shown += ["tip"] if known["tip"] else []
+    shown += ["measured"] if known["measured"] else []
     inputs: dict[Part, Sequence[str]] = {
         "controller": ("reference", "measurement"),
         "plant": ("command", *given),
@@ -188,7 +201,8 @@ def interface(export: Export, typed: TypedInterface, part: Part, *, sampled: boo
     for causality, structures in groups:
         for structure in structures:
             blocks[structure] = len(variables)
-            variables += [_signal(field, causality) for field in known[structure]]
+            at_samples = structure == "measured"
+            variables += [_signal(field, causality, sampled=at_samples) for field in known[structure]]
             if structure == last and "memory" in typed.structures:
                 blocks["memory"] = len(variables)
                 variables += [_signal(field, "local", sampled=sampled) for field in typed.structures["memory"]]
