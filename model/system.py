@@ -45,7 +45,7 @@ from springline.model.drive import (
     static_motor_position,
 )
 from springline.model.dynamics import EquationsOfMotion, equations_of_motion
-from springline.model.hardware import EFFECTS, actuated, sensed
+from springline.model.hardware import EFFECTS, acting, actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.mechanisms import MECHANISMS, Mechanism, expect_plausible
 from springline.model.metrics import METRICS
@@ -64,6 +64,7 @@ from springline.model.quantities import (
     SIGMA,
     TIP,
     TIP_RATE,
+    U_CMD,
     U_S,
     U_WISHED,
     E,
@@ -154,7 +155,13 @@ class System:
         for table, own in own_control_tables(self.structure).items():
             self._control |= vector.table(f"control.{table}", own, self.joints)
         effects = [EFFECTS[name] for name in self.structure.effects]
-        self._sensor = vector.table("sensor", [item for effect in effects for item in effect.parameters], self.joints)
+        sensors, motors = (
+            [item for effect in effects if effect.table == table for item in effect.parameters]
+            for table in ("sensor", "actuator")
+        )
+        self._sensor = vector.table("sensor", sensors, self.joints)
+        self._actuator = vector.table("actuator", motors, self.joints)
+        self.actuators = tuple(effect.name for effect in effects if effect.table == "actuator")
 
         self.t = ca.SX.sym("t")
         symbols = SignalSymbols(self.t, vector)
@@ -186,6 +193,8 @@ class System:
         self.z = ca.SX.sym("z", len(self.memory))
         self.h = ca.SX.sym("h")
         self.noise = ca.SX.sym("noise", self.x.numel() if any(effect.noisy for effect in effects) else 0)
+        self.m = ca.SX.sym("m", n * len(self.actuators))
+        self.step = ca.SX.sym("step")
         self._sampled = any(effect.sampled for effect in effects)
         self._expect_different_names()
         self._terms: dict[str, tuple[Term, ...]] = {}
@@ -334,7 +343,13 @@ class System:
             *self.forces,
             *self.observed,
             *self.measured,
+            *self.commanded,
         )
+
+    @property
+    def commanded(self) -> tuple[Quantity, ...]:
+        """The controller's command, where it is not what acts."""
+        return (U_CMD,) if self.structure.delay or self.actuators else ()
 
     @property
     def trajectory(self) -> tuple[Entry, ...]:
@@ -530,6 +545,17 @@ class System:
             **self._named("loop_control", sampling, control_terms, sampling_names),
             **self._named("loop_plant", [w, x, self.u], plant_terms, ["w", "x", "u"]),
         }
+        if self.commanded:
+            arrived = ca.SX.sym("arrived", self.n)
+            memory = dict(zip(self.actuators, ca.vertsplit(self.m, self.n) if self.actuators else (), strict=True))
+            forces, after = acting(self.actuators, arrived, memory, self.step, self.tableau.nodes, self._actuator)
+            result |= function(
+                "loop_actuate",
+                [arrived, self.m, self.step],
+                [ca.vertcat(*forces), ca.vertcat(ca.SX(0, 1), *(after[name] for name in self.actuators))],
+                ["arrived", "m", "step"],
+                ["acting", "m_next"],
+            )
         if self.tip is not None:
             at = ca.substitute(self.tip, w, self._signal_expressions)
             result |= function("loop_tip", [self.t, self.d, x], [at], ["t", "d", "x"], ["tip"])

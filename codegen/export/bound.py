@@ -133,7 +133,8 @@ class Export:
     def sha256(self) -> str:
         """Hash of model, parameters and options: it changes if and only if the exported files may."""
         identity: dict[str, object] = {
-            "structure": asdict(self.system.structure),
+            # A hash of what a structure does not have would be another one with each thing that it could have.
+            "structure": {k: v for k, v in asdict(self.system.structure).items() if v or k != "delay"},
             "parameters": {slot.key: value for slot, value in zip(self.slots, self.values, strict=True)},
             "tunable": [slot.key for slot in self.tunable_slots],
             "prefix": self.prefix,
@@ -151,6 +152,11 @@ class Export:
         for function in self.system.functions.values():
             digest.update(_instructions(function))
         return digest.hexdigest()
+
+
+def remembered(system: System) -> list[str]:
+    """What a plant's state calls that which its motors remember, in the order of m."""
+    return [{"rate_limit": "U_last", "lag": "a"}[name] for name in system.actuators]
 
 
 def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
@@ -182,6 +188,11 @@ def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
         DISTURBANCE.name: of(DISTURBANCE),
         "x": state,
         "y": [(f"measured_{name}", unit) for name, unit in state],
+        "arrived": force("arrived"),
+        "m": [(f"{name}_{j.name}", j.force) for name in remembered(system) for j in joints],
+        "m_next": [(f"{name}_{j.name}_next", j.force) for name in remembered(system) for j in joints],
+        "step": [("step", "s")],
+        "acting": [(f"U_{k}_{j.name}", j.force) for k in range(len(system.tableau.nodes)) for j in joints],
         "noise": [(f"noise_{name}", "1") for name, _ in state],
         "dx": of(*(DERIVATIVES[item] for item in system.drive.state)),
         "M1": [

@@ -61,6 +61,9 @@ def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes
     sensors = ""
     if measured := program.size("measured"):
         sensors = f"#define SL_NMEASURED {measured}\n#define SL_NNOISE {program.size('noise')}\n"
+    if program.size("commanded"):
+        delay = program.system.structure.delay
+        sensors += f"#define SL_ACTUATED 1\n#define SL_DELAY {delay}\n#define SL_NM {program.size('m')}\n"
     enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
     return f"""#define SL_W {width}
 #define SL_G {shape.groups}

@@ -78,7 +78,13 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
         update = call("update", w, s, *at, *noise, "&period", p, r, results=["(double *)ahead"])
         rates = call("rates", w, s, *at, *noise, p, r, results=[f"(double *)(dx + {states})"])
         sample, closed = f"{control}\n{update}", f"{control}\n{rates}"
-    if not measured:  # continuous control has no samples, and so nothing that is measured at them
+    actuated, actuate = "actuate" in functions, ""
+    if actuated:
+        given = "double step, const sl_group *arrived, const sl_group *m, const sl_group *p, const sl_group *r"
+        results = ["(double *)acting", "(double *)ahead"]
+        body = call("actuate", f"{flat}arrived", f"{flat}m", "&step", p, results=results)
+        actuate = f"static inline void kernel_actuate({given}, sl_group *acting, sl_group *ahead) {{\n{body}\n}}\n\n"
+    if not measured and not actuated:  # continuous control has no samples, and so nothing that is measured at them
         closed = f"""static inline void kernel_closed({state}, sl_group *dx, {computed}) {{
 {closed}
   kernel_plant(now, x, (const sl_group *)u, p, r, dx);
@@ -97,7 +103,7 @@ enum {{ SL_NUMBER_W = {program.size("w")} }};
 #define CASADI_SYMBOL_EXPORT __attribute__((visibility("hidden")))
 #include "functions.c"
 
-static inline void kernel_run(const sl_group *p, sl_group *r) {{
+static inline void kernel_run(const sl_group *p, {"double step, " * actuated}sl_group *r) {{
 {call("run", p, results=["(double *)r"])}
 }}
 
@@ -122,7 +128,7 @@ static inline void kernel_signals(sl_time now, const sl_group *p, const sl_group
   for (i = 0; i < SL_NF; i++) b[SL_NB + i][0] = now.varying[SL_NUMBER_W - SL_NF + i][0];
 }}
 
-{tip}static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
+{actuate}{tip}static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
 {call("error", w, s, *at, p, r, results=["(double *)e", "(double *)sigma"])}
 }}
 

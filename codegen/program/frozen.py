@@ -18,6 +18,10 @@ anything but the state, control gives that too, as its last output)
 
     noise   standard normal numbers of the sample, one for each entry of x
 
+and where motors are not driven by the command as it is
+
+    actuate(arrived, m, step, p) -> acting, m_next   (once a step: forces at its nodes, what motors remember)
+
 and where the arm has a tip, for the rows of a trajectory, so that it is computed nowhere else
 
     tip(t, d, x, p) -> tip
@@ -55,6 +59,8 @@ class Program:
             "w": self.system.w.numel(),
             "x": self.system.x.numel(),
             "z": self.system.z.numel(),
+            "m": self.system.m.numel(),
+            "commanded": self.system.n if self.system.commanded else 0,
             "noise": self.system.noise.numel(),
             "measured": len(entries(self.system.measured, self.system.joints)),
             "u": self.system.n,
@@ -139,6 +145,7 @@ def program(structure: Structure) -> Program:
                 "update": ([*sampling, system.h, p, r], staged["update"], [*names_sampling, "h", "p", "r"], ["z_next"]),
             }
         observed = {"tip": system.function("loop_tip")} if system.tip is not None else {}
+        observed |= {"actuate": system.function("loop_actuate")} if system.commanded else {}
         functions = {
             name: ca.Function(f"loop_{name}", ins, ca.cse([ca.densify(o) for o in outs]), names_in, names_out)
             for name, (ins, outs, names_in, names_out) in signature.items()

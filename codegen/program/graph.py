@@ -199,6 +199,12 @@ class LoopGraph(ValueGraph):
         self.add("start", functions["start"], [beginning, first, p, r])
         if "tip" in functions:
             self.add("tip", functions["tip"], [beginning, first, x, p])
+        if "actuate" in functions:
+            arrived, m = (
+                [self.leaf(name, i, Binding.STATE) for i in range(size)]
+                for name, size in (("arrived", program.size("u")), ("m", program.size("m")))
+            )
+            self.add("actuate", functions["actuate"], [arrived, m, [self.leaf("step", 0, Binding.RUN)], p])
         [w] = self.add("signals", functions["signals"], [t, d, p, r])
         [s] = self.add("time", functions["time"], [w, p, r])
         self.add("error", functions["error"], [w, s, x, *z, p, r])

@@ -21,7 +21,7 @@ from springline.model.base import COORDINATES, shortest
 from springline.model.base_motion import MOTIONS, moving_terms
 from springline.model.control import CONTROLLERS, LAWS, LogForm, SurfaceExponents
 from springline.model.drive import DRIVES, FRICTION, DriveKind
-from springline.model.hardware import EFFECTS, SENSORS
+from springline.model.hardware import ACTUATORS, EFFECTS, SENSORS
 from springline.model.mechanisms import MECHANISMS
 from springline.model.structure import MotorStart, SignalKind, SignalShape, Structure
 from springline.model.system import System, system_of
@@ -191,7 +191,12 @@ class Scenario:
             size=size,
             disturbance=disturbance if disturbance.kind != "none" else SignalShape(),
             friction=tuple(item.name for item in FRICTION if self._has(item.name)),
-            effects=tuple(effect.name for effect in SENSORS if any(self.document["sensor"][effect.name])),
+            effects=tuple(
+                effect.name
+                for effect in (*SENSORS, *ACTUATORS)
+                if any(value != effect.absent for value in self.document[effect.table][effect.name])
+            ),
+            delay=round(self.document["actuator"]["delay"] / self.step),
         )
 
     def _has(self, name: str) -> bool:
@@ -464,9 +469,12 @@ class Scenario:
         drive = overrides.get("drive.kind", document["drive"]["kind"])
         if overrides.get("mechanism.name", mechanism) != mechanism:
             control = {k: _without_lists(v) for k, v in document["control"].items() if not isinstance(v, list)}
-            sensor = {k: v for k, v in document["sensor"].items() if not isinstance(v, list)}
+            hardware = {
+                table: {k: v for k, v in document[table].items() if not isinstance(v, list)}
+                for table in ("sensor", "actuator")
+            }
             document = {name: document[name] for name in ("base_motion", "simulation")}
-            document |= {"control": control, "sensor": sensor}
+            document |= {"control": control} | hardware
             document["drive"] = {"kind": drive}
         elif overrides.get(f"mechanism.{schema.SIZE}", self.structure().size) != self.structure().size:
             document = self._resized(document, overrides[f"mechanism.{schema.SIZE}"])
@@ -495,7 +503,7 @@ class Scenario:
         """
         spread = {
             name: _without_equal(document[name])
-            for name in ("mechanism", "drive", "plant", "control", "sensor", "initial")
+            for name in ("mechanism", "drive", "plant", "control", "sensor", "actuator", "initial")
         }
         name = self.structure().mechanism
         kept = {joint.name for joint in MECHANISMS[name].of_size(size_given(name, {schema.SIZE: size})).joints}
@@ -636,6 +644,6 @@ def absent_at_zero(key: str) -> bool:
     name, _, place = rest.partition(".")
     if place and not place.isdecimal():
         return False
-    if table == "sensor":
-        return name in {effect.name for effect in SENSORS}
+    if table in ("sensor", "actuator"):
+        return name in EFFECTS and EFFECTS[name].table == table and EFFECTS[name].absent == 0.0
     return table in ("drive", "plant") and name in {item.name for item in FRICTION}

@@ -20,10 +20,10 @@ from springline.model.base import COORDINATES, MOUNT, MOUNT_RPY
 from springline.model.base_motion import MOTIONS
 from springline.model.control import CONTROLLERS, LARGEST_SURFACE_EXPONENT, LAWS, LogForm
 from springline.model.drive import DRIVES, EPSILON, DriveKind, friction_parameters
-from springline.model.hardware import SENSORS
+from springline.model.hardware import ACTUATORS, SENSORS
 from springline.model.integrators import INTEGRATORS
 from springline.model.mechanisms import MECHANISMS, Mechanism
-from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
+from springline.model.parameters import LIMIT, NON_NEGATIVE, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
 from springline.model.registry import Registry
 from springline.model.structure import Structure
 from springline.model.system import control_parameters, own_control_tables
@@ -346,7 +346,18 @@ class Schema:
 
 
 TABLES = (
-    *("mechanism", "drive", "plant", "control", "sensor", "reference", "base_motion", "disturbance", "initial"),
+    *(
+        "mechanism",
+        "drive",
+        "plant",
+        "control",
+        "sensor",
+        "actuator",
+        "reference",
+        "base_motion",
+        "disturbance",
+        "initial",
+    ),
     "simulation",
 )
 
@@ -408,6 +419,7 @@ def schema(
             "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *moving)}),
             "control": _section("control", shared | _own_tables(own, joints), ControlStructure),
             "sensor": _section("sensor", _sensor(joints)),
+            "actuator": _section("actuator", _actuator(joints)),
             "initial": _section("initial", initial),
             "simulation": Simulation,
         },
@@ -435,6 +447,12 @@ def _sensor(joints: Sequence[Joint]) -> dict[str, Any]:
         "seed": (Annotated[int, count(LARGEST_SEED)], 0),
         "run": (Annotated[int, count(MOST_STEPS)], 0),
     }
+
+
+def _actuator(joints: Sequence[Joint]) -> dict[str, Any]:
+    """[actuator]: what becomes of a command on its way to the motors' force."""
+    delay = {"delay": (Annotated[float, number("s", NON_NEGATIVE)], 0.0)}
+    return delay | _numbers([item for effect in ACTUATORS for item in effect.parameters], joints)
 
 
 def _size(mechanism: Mechanism) -> dict[str, Any]:

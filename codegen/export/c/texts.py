@@ -72,6 +72,10 @@ def _values(export: Export, interface: TypedInterface) -> dict[str, Any]:
         "memory_start": [constant(value) for value in system.z_start],
         "sliding": bool(system.sliding),
         "disturbed": bool(system.forces),
+        "actuate": interface.actuate,
+        "delay": system.structure.delay,
+        "motors": interface.structures.get("motors", ()),
+        "joints_count": system.n,
         "sensed": bool(system.measured),
         "noise_blocks": -(-system.noise.numel() // 4),
         "seed": export.seed,
@@ -99,7 +103,8 @@ def _stepping(export: Export, interface: TypedInterface) -> dict[str, Any]:
     tableau, states = export.system.tableau, len(interface.structures["state"])
 
     def evaluate(when: int, at: str, slope: str) -> list[str]:
-        return [f"{export.prefix}_evaluate_plant(controller, motion[{when}], {at}, command, {slope});"]
+        command = f"&driven[{when}]" if export.system.commanded else "command"
+        return [f"{export.prefix}_evaluate_plant(controller, motion[{when}], {at}, {command}, {slope});"]
 
     return {
         "slopes": scalar_slopes(tableau),

@@ -65,8 +65,8 @@ def fmu(
     if part != "controller" and structure.disturbance.kind == "none":
         structure = replace(structure, disturbance=SignalShape("input"))
     system = system_of(structure)
-    if system.measured and settings.period == 0.0:
-        raise ValueError("sensors show something at samples: expected a period, 0 is for continuous control")
+    if (system.measured or system.commanded) and settings.period == 0.0:
+        raise ValueError("sensors and motors go by samples: expected a period, 0 is for continuous control")
     if len(tables) != len(system.tables):
         raise ValueError(f"{len(tables)} tables given, the system has {len(system.tables)}")
     wanted = bind(structure, values, tunable=tunable).tunable

@@ -12,7 +12,7 @@ import casadi as ca
 from springline.codegen.export import Export
 from springline.codegen.export.c import Field, TypedInterface
 from springline.model.parameters import REAL, Bounds
-from springline.model.quantities import TIP, TIP_RATE, entries
+from springline.model.quantities import TIP, TIP_RATE, U, entries
 from springline.model.system import System
 
 Part = Literal["controller", "plant", "loop"]
@@ -124,6 +124,7 @@ def structures_of(typed: TypedInterface) -> dict[str, tuple[Field, ...]]:
     base = typed.structures["base"]
     motion = len(base) - len(entries(system.forces, system.joints))
     tip = tuple(Field(entry.name, entry.unit, entry.meaning) for entry in entries(system.observed, system.joints))
+    acting = entries((U,), system.joints) if system.commanded else ()
     shown = {entry.name: entry for entry in entries(system.measured, system.joints)}
     places = [f"{quantity.name}_measured_{joint.name}" for quantity in system.drive.state for joint in system.joints]
     names = dict(zip((field.name for field in typed.structures["state"]), places, strict=True))
@@ -135,6 +136,7 @@ def structures_of(typed: TypedInterface) -> dict[str, tuple[Field, ...]]:
         "disturbance": base[motion:],
         "tip": tip if typed.tip else (),
         "measured": measured,
+        "acting": tuple(Field(e.name, e.unit, f"force of the motor ({e.joint.name})") for e in acting if e.joint),
     }
 
 
@@ -145,7 +147,7 @@ def part_parameters(system: System, part: Part) -> tuple[int, ...]:
     if part == "controller":
         return tuple(sorted(control))
     used = {*_read(system, "plant"), *_read(system, "start"), *(_read(system, "tip") if system.observed else ())}
-    used |= {*_read(system, "measure")}
+    used |= {*_read(system, "measure"), *(_read(system, "loop_actuate") if system.commanded else ())}
     if part == "loop":
         used |= control
     signals = {
@@ -179,6 +181,10 @@ def interface(export: Export, typed: TypedInterface, part: Part, *, sampled: boo
     shown = [name for name, is_input in outside.items() if not is_input and known[name]]
     shown += ["tip"] if known["tip"] else []
     shown += ["measured"] if known["measured"] else []
+    shown += ["acting"] if known["acting"] and part == "loop" else []
+    if part == "loop" and export.system.commanded:
+        asked = entries(export.system.commanded, export.system.joints)
+        known["command"] = tuple(Field(entry.name, entry.unit, entry.meaning) for entry in asked)
     inputs: dict[Part, Sequence[str]] = {
         "controller": ("reference", "measurement"),
         "plant": ("command", *given),

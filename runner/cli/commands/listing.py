@@ -91,7 +91,7 @@ def parameters() -> list[Row]:
     a row for each, with its name.
     """
     from springline.model.drive import EPSILON, friction_parameters
-    from springline.model.hardware import SENSORS
+    from springline.model.hardware import ACTUATORS, SENSORS
     from springline.model.mechanisms import MECHANISMS
     from springline.model.system import control_parameters
 
@@ -100,6 +100,7 @@ def parameters() -> list[Row]:
         tables = {
             "mechanism": mechanism.parameters,
             "sensor": tuple(item for effect in SENSORS for item in effect.parameters),
+            "actuator": tuple(item for effect in ACTUATORS for item in effect.parameters),
             "drive": (*mechanism.motor_inertia, *mechanism.stiffness, *friction_parameters("elastic"), EPSILON),
             "control": control_parameters(mechanism),
         }
