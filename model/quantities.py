@@ -119,6 +119,7 @@ TIP_RATE = tuple(
 
 # The controller
 U = Quantity("U", "U", "{F}", "command to the motor")
+U_CMD = Quantity("U_cmd", r"U_\mathrm{cmd}", "{F}", "command of the controller, which arrives at the motors later")
 E = Quantity("e", "e", "{q}", "tracking error")
 SIGMA = Quantity("sigma", r"\sigma", "{q}/s", "sliding variable")
 U_S = Quantity("U_s", "U_s", "{F}", "slow part of the command, before its limit")

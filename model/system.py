@@ -51,7 +51,7 @@ from springline.model.drive import (
     static_motor_position,
 )
 from springline.model.dynamics import EquationsOfMotion, equations_of_motion
-from springline.model.hardware import actuated, sensed
+from springline.model.hardware import EFFECTS, acting, actuated, sensed
 from springline.model.integrators import INTEGRATORS, Tableau
 from springline.model.mechanisms import MECHANISMS, BodyCheck, Implausible, Mechanism
 from springline.model.metrics import METRICS
@@ -70,6 +70,7 @@ from springline.model.quantities import (
     SIGMA,
     TIP,
     TIP_RATE,
+    U_CMD,
     U_S,
     U_WISHED,
     E,
@@ -180,6 +181,14 @@ class System:
         self._observing = self._control | (own.pop(self.observer.name, Values({})) if self.observer else Values({}))
         for values in own.values():
             self._control |= values
+        effects = [EFFECTS[name] for name in self.structure.effects]
+        sensors, motors = (
+            [item for effect in effects if effect.table == table for item in effect.parameters]
+            for table in ("sensor", "actuator")
+        )
+        self._sensor = vector.table("sensor", sensors, self.joints)
+        self._actuator = vector.table("actuator", motors, self.joints)
+        self.actuators = tuple(effect.name for effect in effects if effect.table == "actuator")
 
         self.t = ca.SX.sym("t")
         symbols = SignalSymbols(self.t, vector)
@@ -210,6 +219,10 @@ class System:
         self.u = ca.SX.sym("u", n)
         self.z = ca.SX.sym("z", len(self.memory))
         self.h = ca.SX.sym("h")
+        self.noise = ca.SX.sym("noise", self.x.numel() if any(effect.noisy for effect in effects) else 0)
+        self.m = ca.SX.sym("m", n * len(self.actuators))
+        self.step = ca.SX.sym("step")
+        self._sampled = any(effect.sampled for effect in effects)
         self._expect_different_names()
         self._terms: dict[str, tuple[Term, ...]] = {}
 
@@ -331,6 +344,28 @@ class System:
         return () if self.tip is None else (*TIP, *TIP_RATE)
 
     @property
+    def measured(self) -> tuple[Quantity, ...]:
+        """What sensors show in place of the state, where they do at samples alone."""
+        return tuple(
+            replace(item, name=f"{item.name}_measured", meaning=f"measured {item.meaning}")
+            for item in self._seen_through
+        )
+
+    @property
+    def _seen_through(self) -> list[Quantity]:
+        """Quantities of the state in whose place sensors show something at samples."""
+        return [
+            item for item in self.drive.state if self._sampled and not ca.is_equal(self._shown[item], self._state[item])
+        ]
+
+    @derived_property
+    def _shown(self) -> dict[Quantity, ca.SX]:
+        """What the sensors show of the state."""
+        n = self.n
+        noise = {item: self.noise[k * n : (k + 1) * n] for k, item in enumerate(self._state) if self.noise.numel()}
+        return dict(sensed(self.structure.effects, self._state, self._sensor, noise))
+
+    @property
     def columns(self) -> tuple[Quantity, ...]:
         """What a trajectory shows, in the order of the loop's rows."""
         return (
@@ -344,7 +379,14 @@ class System:
             self.base_motion[0],
             *self.forces,
             *self.observed,
+            *self.measured,
+            *self.commanded,
         )
+
+    @property
+    def commanded(self) -> tuple[Quantity, ...]:
+        """The controller's command, where it is not what acts."""
+        return (U_CMD,) if self.structure.delay or self.actuators else ()
 
     @property
     def trajectory(self) -> tuple[Entry, ...]:
@@ -575,32 +617,55 @@ class System:
         w, x, function = self.w, self.x, self._function
         z_in, z_names = ([self.z], ["z"]) if self.memory else ([], [])
         ins, names = [w, x, *z_in], ["w", "x", *z_names]
-        y = ca.vertcat(*sensed(self.structure.effects, self._state).values())
+        y = ca.vertcat(*self._shown.values())
         seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished, commanded.a_law]
         later = [commanded.dz, commanded.ahead]
         control_terms, plant_terms = ([term.value for term in self._terms[name]] for name in ("control", "plant"))
         if self.measured_base:
             seen, later, control_terms = (without(values, self._still) for values in (seen, later, control_terms))
+        noise_in, noise_names = ([self.noise], ["noise"]) if self.noise.numel() else ([], [])
+        judged = seen[1:3]  # of the state as it is, whatever the controller sees
         if self.structure.effects:
             seen, later, control_terms = (ca.substitute(values, [x], [y]) for values in (seen, later, control_terms))
+            seen[1:3] = judged
+        sampling, sampling_names = [*ins, *noise_in], [*names, *noise_names]
+        measured = [self._shown[item] for item in self._seen_through]
+        measured_out, measured_names = ([ca.vertcat(*measured)], ["measured"]) if measured else ([], [])
         dx, *plant_terms = without([dx, *plant_terms], self._still)
         result = {
-            **function("measure", [x], [y], ["x"], ["y"]),
+            **function("measure", [x, *noise_in], [y], ["x", *noise_names], ["y"]),
             **function("signals", [self.t, self.d], [self._signal_expressions], ["t", "d"], ["w"]),
             **function("start", [self.t, self.d], [self._start(real)], ["t", "d"], ["x"]),
-            **function("loop_control", ins, seen, names, ["u", "e", "sigma", "wished", "a_law"]),
-            **function("loop_error", ins, seen[1:3], names, ["e", "sigma"]),
+            **function(
+                "loop_control",
+                sampling,
+                [*seen, *measured_out],
+                sampling_names,
+                ["u", "e", "sigma", "wished", "a_law", *measured_names],
+            ),
+            **function("loop_error", ins, judged, names, ["e", "sigma"]),
             **function("loop_plant", [w, x, self.u], [dx], ["w", "x", "u"], ["dx"]),
-            **self._named("loop_control", ins, control_terms, names),
+            **self._named("loop_control", sampling, control_terms, sampling_names),
             **self._named("loop_plant", [w, x, self.u], plant_terms, ["w", "x", "u"]),
         }
+        if self.commanded:
+            arrived = ca.SX.sym("arrived", self.n)
+            memory = dict(zip(self.actuators, ca.vertsplit(self.m, self.n) if self.actuators else (), strict=True))
+            forces, after = acting(self.actuators, arrived, memory, self.step, self.tableau.nodes, self._actuator)
+            result |= function(
+                "loop_actuate",
+                [arrived, self.m, self.step],
+                [ca.vertcat(*forces), ca.vertcat(ca.SX(0, 1), *(after[name] for name in self.actuators))],
+                ["arrived", "m", "step"],
+                ["acting", "m_next"],
+            )
         if self.tip is not None:
             at = ca.substitute(self.tip, w, self._signal_expressions)
             result |= function("loop_tip", [self.t, self.d, x], [at], ["t", "d", "x"], ["tip"])
         if self.memory:
             result |= {
-                **function("loop_rates", ins, later[:1], names, ["dz"]),
-                **function("loop_update", [*ins, self.h], later[1:], [*names, "h"], ["z_next"]),
+                **function("loop_rates", sampling, later[:1], sampling_names, ["dz"]),
+                **function("loop_update", [*sampling, self.h], later[1:], [*sampling_names, "h"], ["z_next"]),
             }
         return result
 

@@ -35,7 +35,10 @@ STRANGERS = {
 PAST_THE_DOOR = {
     "codegen/test_generated_text.py": {"codegen.export.c", "codegen.export.fmu", "codegen.files"},
     "codegen/test_loads.py": {"codegen.export.fmu"},
-    "codegen/test_one_loop.py": {"codegen.export.fmu"},  # has FMUs compiled without optimisation
+    # These have FMUs compiled without optimisation.
+    "codegen/test_one_loop.py": {"codegen.export.fmu"},
+    "codegen/test_sensors.py": {"codegen.export.fmu"},
+    "codegen/test_actuators.py": {"codegen.export.fmu"},
     "runner/conftest.py": {"codegen.kernel", "codegen.export.c"},  # saves work that other tests look at
     "runner/cli/test_cli.py": {"runner.paper"},  # makes up what a reproduction returns
     "runner/test_any_arm.py": {"codegen.kernel"},  # has kernels of many joints compiled without optimisation

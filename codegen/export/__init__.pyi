@@ -5,6 +5,7 @@ from .bound import bind as bind
 from .bound import comment as comment
 from .bound import operations as operations
 from .bound import port_entries as port_entries
+from .bound import remembered as remembered
 from .bound import provenance as provenance
 from .names import LONGEST as LONGEST
 from .names import LONGEST_LINKED as LONGEST_LINKED

@@ -20,6 +20,7 @@ from springline.codegen.nearest import nearest
 from springline.codegen.numbers import real as number
 from springline.codegen.program import Real, SignalTable, count_operations
 from springline.model.drive import COULOMB_VELOCITY, FRICTION
+from springline.model.hardware import SENSORS
 from springline.model.parameters import Slot
 from springline.model.quantities import DDQ1, DERIVATIVES, DISTURBANCE, REFERENCE, SIGMA, E, Quantity, T, entries
 from springline.model.structure import Structure
@@ -66,6 +67,7 @@ class Export:
     real     number type of the C
     tables   data of the system's table signals, in the order of System.tables; () leaves them out, they are zero then
     period   s between two commands: what the states of a controller that has some are moved on by
+    seed, run  what the noise of sensors goes by
     """
 
     system: System
@@ -75,6 +77,8 @@ class Export:
     real: Real = "double"
     tables: tuple[SignalTable, ...] = ()
     period: float = PERIOD
+    seed: int = 0
+    run: int = 0
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -129,7 +133,8 @@ class Export:
     def sha256(self) -> str:
         """Hash of model, parameters and options: it changes if and only if the exported files may."""
         identity: dict[str, object] = {
-            "structure": asdict(self.system.structure),
+            # A hash of what a structure does not have would be another one with each thing that it could have.
+            "structure": {k: v for k, v in asdict(self.system.structure).items() if v or k != "delay"},
             "parameters": {slot.key: value for slot, value in zip(self.slots, self.values, strict=True)},
             "tunable": [slot.key for slot in self.tunable_slots],
             "prefix": self.prefix,
@@ -141,10 +146,17 @@ class Export:
         }
         if self.system.memory:  # nothing else depends on it
             identity["period"] = self.period
+        if self.system.noise.numel():
+            identity |= {"seed": self.seed, "run": self.run}
         digest = hashlib.sha256(canonical_json(identity))
         for function in self.system.functions.values():
             digest.update(_instructions(function))
         return digest.hexdigest()
+
+
+def remembered(system: System) -> list[str]:
+    """What a plant's state calls that which its motors remember, in the order of m."""
+    return [{"rate_limit": "U_last", "lag": "a"}[name] for name in system.actuators]
 
 
 def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
@@ -176,6 +188,12 @@ def port_entries(system: System) -> dict[str, list[tuple[str, str]]]:
         DISTURBANCE.name: of(DISTURBANCE),
         "x": state,
         "y": [(f"measured_{name}", unit) for name, unit in state],
+        "arrived": force("arrived"),
+        "m": [(f"{name}_{j.name}", j.force) for name in remembered(system) for j in joints],
+        "m_next": [(f"{name}_{j.name}_next", j.force) for name in remembered(system) for j in joints],
+        "step": [("step", "s")],
+        "acting": [(f"U_{k}_{j.name}", j.force) for k in range(len(system.tableau.nodes)) for j in joints],
+        "noise": [(f"noise_{name}", "1") for name, _ in state],
         "dx": of(*(DERIVATIVES[item] for item in system.drive.state)),
         "M1": [
             (f"M1_{row.name}_{column.name}", f"{row.force} s^2/{column.unit}") for column in joints for row in joints
@@ -192,6 +210,8 @@ def bind(
     real: Real = "double",
     tables: Sequence[SignalTable] = (),
     period: float = PERIOD,
+    seed: int = 0,
+    run: int = 0,
 ) -> Export:
     """The Export of a structure with these numbers.
 
@@ -202,6 +222,7 @@ def bind(
     real       number type of the C
     tables     data of the table signals, in the order of System.tables, for real = "double"; () leaves them out
     period     s between two commands, which the states of a controller go by
+    seed, run  what the noise of sensors goes by
     Raises ValueError for a wrong number of values or tables, a value out of its bounds, an unknown name or an unusable
     prefix.
     """
@@ -218,14 +239,15 @@ def bind(
     if tables and (len(tables) != len(system.tables) or real != "double"):
         raise ValueError(f"{len(tables)} tables in {real}, expected {len(system.tables)} in double")
     seconds = number("period", period, positive=True)
-    return Export(system, numbers, _tunable(system.slots, tunable), prefix, real, tuple(tables), seconds)
+    return Export(system, numbers, _tunable(system.slots, tunable), prefix, real, tuple(tables), seconds, seed, run)
 
 
 _STRUCTURAL = ("law", "controller", "observer", "feedforward", "log_form", "mode", "period", "fast", "l", "m", "p", "r")
 _STRUCTURE = frozenset(f"control.{key}" for key in _STRUCTURAL)
 
 _FRICTIONS = "|".join(item.name for item in FRICTION)
-_ABSENT_AT_ZERO = re.compile(rf"((drive|plant)\.({_FRICTIONS})|base_motion\.mount(_rpy)?)(\.\d+)?")
+_SENSORS = "|".join(item.name for effect in SENSORS for item in effect.parameters)
+_ABSENT_AT_ZERO = re.compile(rf"((drive|plant)\.({_FRICTIONS})|sensor\.({_SENSORS})|base_motion\.mount(_rpy)?)(\.\d+)?")
 _NEEDS_COULOMB = re.compile(rf"(drive|plant)\.{COULOMB_VELOCITY.name}(\.\d+)?")
 
 

@@ -163,7 +163,7 @@ def _formula(op: int, texts: Sequence[str]) -> str:
 _OWN = re.compile(r"[acr]\d+|sin_\w+|cos_\w+|slf?_\w+")
 _GIVEN = frozenset({
     *("controller", "reference", "measurement", "command", "diagnostics", "base", "state", "config", "parameters"),
-    *("derived", "ahead", "motion", "step", "next", "x", "dx", "u", "z", "dz", "d", "t", "p"),
+    *("derived", "ahead", "motion", "step", "next", "x", "dx", "u", "z", "dz", "d", "t", "p", "noise"),
 })  # fmt: skip
 
 
@@ -366,11 +366,15 @@ class ScalarPrinter:
                 ready.add(i)
                 if given(i) != names[i]:
                     lines.append(f"const {self._real} {names[i]} = {given(i)};")
-            return f"{self._math}_true({names[i]})" if node.op in MASKS else names[i]
+            return f"{self._math}_true({names[i]})" if is_mask(i) else names[i]
+
+        def is_mask(i: int) -> bool:
+            """Whether it is a truth value in C: one that depends on parameters only is kept as a number."""
+            return nodes[i].op in MASKS and (deriving or i not in self._derived)
 
         def truth(i: int) -> str:
             text = value(i)
-            return names[i] if nodes[i].op in MASKS else f"({text} != {literal(0.0, self._real)})"
+            return names[i] if is_mask(i) else f"({text} != {literal(0.0, self._real)})"
 
         for i in needed:
             node = nodes[i]

@@ -13,6 +13,7 @@ from .runs import STATUS as STATUS
 from .runs import chatters as chatters
 from .runs import joined as joined
 from .runs import quantity_name as quantity_name
+from .settings import LARGEST_SEED as LARGEST_SEED
 from .settings import LoopSettings as LoopSettings
 from .settings import MOST_STEPS as MOST_STEPS
 from .source import KernelSource as KernelSource

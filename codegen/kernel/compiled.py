@@ -18,7 +18,7 @@ from springline.codegen.kernel.settings import LoopSettings
 from springline.codegen.kernel.source import KernelSource, print_kernel
 from springline.codegen.kernel.spec import KernelSpec
 from springline.codegen.memory import memory
-from springline.codegen.numbers import doubles
+from springline.codegen.numbers import doubles, shown
 from springline.codegen.program import Program, SignalTable, program
 from springline.model.structure import TableLayout
 from springline.model.system import System
@@ -116,10 +116,12 @@ class Kernel:
         settings: LoopSettings,
         tables: Sequence[SignalTable] = (),
         *,
+        numbers: Sequence[int] | None = None,
         watch: Watch | None = None,
     ) -> Runs:
         """Simulate one run per row of `parameters` (runs, len(self.parameters)), in this thread, without the GIL.
 
+        numbers  of the runs, 0 or more, which the noise of sensors goes by; None for 0 in all of them
         Raises ValueError if `parameters` or `tables` do not have the shape the kernel was built for, and for results
         that this machine's memory cannot hold; TypeError or ValueError for numbers that are no doubles.
         """
@@ -151,6 +153,9 @@ class Kernel:
                 f"limits has {len(settings.limits)} pairs, expected one for each of {self.shape.joints} joints"
             )
         limits = np.array(settings.limits, dtype=np.float64)
+        counted = np.zeros(runs, np.int64) if numbers is None else np.array(numbers, dtype=np.int64)
+        if counted.shape != (runs,) or np.any(counted < 0):
+            raise ValueError(f"numbers are {shown(numbers)}, expected one of 0 or more for each of {runs} runs")
         rows = settings.rows
         needed, there = 8 * runs * rows * self.shape.columns, memory()
         if needed > there:
@@ -181,6 +186,8 @@ class Kernel:
             settling_band=settings.settling_band,
             response_error=settings.response_error,
             settling_error=settings.settling_error,
+            seed=settings.seed,
+            numbers=None if numbers is None else counted.ctypes.data,
             parameters=parameters.ctypes.data,
             tables=ctypes.addressof(c_tables),
             metrics=result.metrics.ctypes.data,

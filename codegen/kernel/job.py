@@ -45,6 +45,8 @@ JOB = (
     Member("settling_band", "double", "fraction of |e_i(0)|, 0 where settling_error counts"),
     Member("response_error", "double", "|e_i|, SI"),
     Member("settling_error", "double", "|e_i|, SI"),
+    Member("seed", "int64_t", "32 bits, of the noise"),
+    Member("numbers", "const int64_t *", "runs, the number that the noise of each goes by; NULL: 0"),
     Member("parameters", "const double *", "runs x SL_NP"),
     Member("tables", "const sl_table *", "SL_NTABLES tables"),
     Member("metrics", "double *", "runs x SL_NMETRICS"),

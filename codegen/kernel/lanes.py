@@ -148,12 +148,12 @@ class _Emitter:
         """C expression of an input, or of a value from an earlier binding time, for group g of runs."""
         node = self.graph.nodes[i]
         name, k = node.source
-        if name in ("p", "x", "u"):
+        if name in ("p", "x", "u", "noise", "arrived", "m"):
             return f"{name}[{k}][g]"
         if name == "z":  # behind the plant's state
             return f"x[{self.program.size('x') + k}][g]"
-        if name == "h":
-            return "slv_set(period)"
+        if name in ("h", "step"):
+            return "slv_set(period)" if name == "h" else "slv_set(step)"
         if name in ("begin", "first"):
             return "slv_set(time)" if name == "begin" else f"slv_set(data[{k}])"
         if node.binding is Binding.RUN:
@@ -217,13 +217,22 @@ class _Emitter:
         text = self._function(name, arguments, self.values.wanted[name], Binding.STATE, targets.__getitem__)
         return text.replace("static inline", "SL_RARE")
 
+    def _actuate(self) -> str:
+        """What motors are driven by in a step."""
+        results = {"acting": len(self.graph.outputs["actuate"][0]), "ahead": self.program.size("m")}
+        signature = "double step, const sl_group *arrived, const sl_group *m"
+        return self._complete("actuate", signature, results).replace("SL_RARE", "static inline")
+
     def text(self) -> str:
         """All functions of the kernel but its steps."""
         n, states, outputs = self.program.system.n, self.program.size("x"), self.graph.outputs
         memory = self.program.size("z")
         now = "sl_time now, const sl_group *x"
         control = {"u": n, "e": n, "sigma": n, "wished": n, "a_law": n}
-        sampling, sample = (f"{now}, double period", control | {"ahead": memory}) if memory else (now, control)
+        measured, actuated = self.program.size("measured"), bool(self.program.size("commanded"))
+        sampling = f"{now}, const sl_group *noise" if measured else now
+        sample = control | ({"measured": measured} if measured else {}) | ({"ahead": memory} if memory else {})
+        sampling += ", double period" if memory else ""
         begun = [*outputs["start"][0], *map(self.graph.constant, self.program.system.z_start)]
         at_time = f"double time, const double *data, {_GIVEN}"
         at_row = f"double time, const double *data, const sl_group *x, {_GIVEN}, sl_group *tip"
@@ -236,7 +245,7 @@ class _Emitter:
 
         parts = [
             "/* ---- once per run ---- */\n",
-            self._staged("r", Binding.RUN, self._given, "const sl_group *p, sl_group *r"),
+            self._staged("r", Binding.RUN, self._given, f"const sl_group *p, {'double step, ' * actuated}sl_group *r"),
             self._function("start", f"{at_time}, sl_group *x", begun, Binding.STATE, into("x")),
             "/* ---- once per time: for all runs, then for each ---- */\n",
             self._staged(
@@ -264,10 +273,11 @@ class _Emitter:
         return "\n".join([
             *parts,
             "/* ---- at every evaluation, where a block does not hold ---- */\n",
-            self._complete("closed", now, {"dx": states + memory, **control}),
+            *([] if measured or actuated else [self._complete("closed", now, {"dx": states + memory, **control})]),
             self._complete("control", sampling, sample),
             self._complete("error", now, {"e": n, "sigma": n}),
             self._complete("plant", f"{now}, const sl_group *u", {"dx": states}),
+            *([self._actuate()] if actuated else []),
         ])  # fmt: skip
 
 

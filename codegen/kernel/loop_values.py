@@ -12,7 +12,8 @@ from springline.model.quantities import entries
 _OWN = re.compile(r"[adrsv]\d+(_\d+)?|(begin|first)\d+|sin_\w+|cos_\w+|(sl|slv|kernel)_\w+|ok(_\d+)?")
 _GIVEN = frozenset({
     *("now", "x", "p", "r", "u", "g", "t", "b", "dx", "q1d", "e", "sigma", "wished", "a_law", "ahead", "period"),
-    *("time", "times", "data", "uniform", "varying", "from", "next", "at", "kept", "gains"),
+    *("time", "times", "data", "noise", "measured", "acting", "arrived", "m", "step", "uniform", "varying", "from"),
+    *("next", "at", "kept", "gains"),
 })  # fmt: skip
 
 
@@ -46,6 +47,8 @@ class LoopValues:
             "error": [i for part in outputs["error"] for i in part],
             "plant": list(outputs["plant"][0]),
         }
+        if "actuate" in outputs:
+            self.wanted["actuate"] = [i for part in outputs["actuate"] for i in part]
         n = program.system.n
         w = outputs["signals"][0]
         self.observed = [*w[:n], *w[3 * n : 3 * n + program.system.base.b.numel()]]
@@ -79,6 +82,14 @@ class LoopValues:
                 names[i] = states[k]
             elif node.op is None and kind == "z":
                 names[i] = system.memory[k].name
+            elif node.op is None and kind == "noise":
+                names[i] = f"noise_{states[k]}"
+            elif node.op is None and kind == "step":
+                names[i] = "whole_step"
+            elif node.op is None and kind == "arrived":
+                names[i] = f"arrived_{joints[k]}"
+            elif node.op is None and kind == "m":
+                names[i] = f"last_{system.actuators[k // len(joints)]}_{joints[k % len(joints)]}"
             elif node.op is None and kind == "u":
                 names[i] = f"u_{joints[k]}"
             elif node.op is None and kind == "p":
@@ -92,7 +103,7 @@ class LoopValues:
         signal = [f"{q}_{j}" for q in ("q1d", "dq1d", "ddq1d") for j in joints]
         signal += [f"{d}{c}" for d in ("", "d_", "dd_") for c in base]
         name(outputs["signals"][0], signal + [entry.name for entry in entries(system.forces, system.joints)])
-        for part, label in zip(outputs["control"], ("command", "e", "sigma", "wished", "a_law"), strict=True):
+        for part, label in zip(outputs["control"][:5], ("command", "e", "sigma", "wished", "a_law"), strict=True):
             name(part, [f"{label}_{j}" for j in joints])
         self._name_parts(names)
         return names

@@ -10,11 +10,16 @@ MOST_STEPS = 2**53
 """Steps are counted in doubles too, and these hold no more whole numbers without a gap."""
 
 
+LARGEST_SEED = 2**32 - 1
+"""The generator's key has words of 32 bits."""
+
+
 @dataclass(frozen=True, slots=True)
 class LoopSettings:
     """What the loop is told about every run of a batch: steps of h s, bound on |x_i|, sampling, output, thresholds.
 
     limits  least and greatest q1 of each joint, infinite where there is none; () for a loop that looks at none
+    seed    of the noise on what sensors show, 32 bits
 
     Raises ValueError, with the name and what was expected, for numbers that the loop cannot count or step with.
     """
@@ -30,6 +35,7 @@ class LoopSettings:
     settling_error: float = 0.0
     start_time: float = 0.0
     limits: tuple[tuple[float, float], ...] = ()
+    seed: int = 0
 
     def __post_init__(self) -> None:
         checked = {
@@ -42,6 +48,7 @@ class LoopSettings:
             "settling_band": real("settling_band", self.settling_band),
             "response_error": real("response_error", self.response_error),
             "settling_error": real("settling_error", self.settling_error),
+            "seed": whole("seed", self.seed, 0, LARGEST_SEED),
             "start_time": real("start_time", self.start_time),
         }
         for name, value in checked.items():

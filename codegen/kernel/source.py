@@ -19,7 +19,7 @@ from springline.codegen.kernel.steps import print_steps
 from springline.codegen.program import Program, casadi_c, kernel_update
 from springline.model.quantities import entries
 
-_RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_lanes.h", "sl_casadi.h")
+_RUNTIME = ("loop.c", "metrics.h", "sl_tables.h", "sl_lanes.h", "sl_casadi.h", "sl_noise.h")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +58,12 @@ def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes
         "SL_NTABLES": len(program.system.tables),
     }
     assert program.size("d") == len(program.system.tables) + 4 * channels
+    sensors = ""
+    if measured := program.size("measured"):
+        sensors = f"#define SL_NMEASURED {measured}\n#define SL_NNOISE {program.size('noise')}\n"
+    if program.size("commanded"):
+        delay = program.system.structure.delay
+        sensors += f"#define SL_ACTUATED 1\n#define SL_DELAY {delay}\n#define SL_NM {program.size('m')}\n"
     enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
     return f"""#define SL_W {width}
 #define SL_G {shape.groups}
@@ -66,7 +72,7 @@ def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes
 #define SL_NZ {memory}
 #define SL_SLIDING {sliding}
 #define SL_NTIP {len(program.system.observed)}
-#include "metrics.h"
+{sensors}#include "metrics.h"
 #include "simulate.h"
 #include "sl_lanes.h"
 
@@ -92,6 +98,7 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
     """
     if program.system.structure != spec.structure:
         raise ValueError(f"the program is of {program.system.structure}, expected {spec.structure}")
+    shared = {name: text for name, text in runtime_sources().items() if name != "sl_noise.h" or program.size("noise")}
     slots, size, sampled, options = program.system.slots, program.size, spec.sampled, spec.options
     if options.engine == "casadi":
         sizes = {"p": size("p"), "r": size("r"), "uniform": 0, "varying": size("w") + size("s")}
@@ -101,7 +108,7 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
         start += f"\n#define SL_BLOCKED 0\n#define SL_BLOCKED_TIMES 0\n#define SL_FUSED 0\n{sizes_of_steps}\n"
         parameters = tuple(slot.key for slot in slots)
         start = f"{start}\n{print_metrics(program.system)}"
-        files = {**runtime_sources(), **casadi_c.kernel_header(program, start)}
+        files = {**shared, **casadi_c.kernel_header(program, start)}
     else:
         width = options.width or toolchain.native_vector_width(options.compiler)
 
@@ -120,7 +127,7 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
         steps = print_steps(emission.values, sampled, shape)
         start = preamble(program, steps.shape, width=width, sampled=sampled, sizes=emission.sizes)
         parameters = emission.tunable
-        files = {**runtime_sources(), "kernel.h": f"{start}\n{emission.text}\n{steps.text}"}
+        files = {**shared, "kernel.h": f"{start}\n{emission.text}\n{steps.text}"}
     return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)
 
 
@@ -142,7 +149,7 @@ _ONE_BY_ONE = Shape("evaluation", 1, 1, 0)
 
 @lru_cache(maxsize=1)
 def runtime_sources() -> dict[str, str]:
-    """The C that all kernels share, by file name."""
+    """The C that kernels share, by file name."""
     folder = resources.files("springline.codegen") / "runtime"
     files = {"simulate.h": job_header(), "sl_math.h": math_header()}
     return {**files, **{name: (folder / name).read_text() for name in _RUNTIME}}

@@ -11,6 +11,7 @@ from springline.codegen.kernel.paying import Span
 from springline.codegen.kernel.toolchain import Compiler
 from springline.codegen.nearest import nearest
 from springline.codegen.numbers import real, whole
+from springline.model.hardware import EFFECTS
 from springline.model.structure import Structure
 from springline.model.system import system_of
 
@@ -80,6 +81,10 @@ class KernelSpec:
     _constant_bits: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        if not self.sampled and self.structure.delay:
+            raise ValueError("a delay is of samples: expected a control that is sampled")
+        if not self.sampled and (effects := [name for name in self.structure.effects if EFFECTS[name].sampled]):
+            raise ValueError(f"effect {effects[0]!r} is one of samples: expected a control that is sampled")
         if self.tunable is None:
             if self.baked:
                 raise ValueError(f"baked has {len(self.baked)} values, expected none where every parameter is tunable")

@@ -19,6 +19,10 @@ from springline.codegen.program import Binding, kept_slopes, literal, updates
 
 _SHOWN = ("u", "e", "sigma", "wished", "a_law")
 
+_SENSORS = ", const sl_group *restrict noise, sl_group *restrict measured"
+
+_ACTUATORS = ", sl_group (*restrict acting)[SL_NJ]"
+
 PREAMBLE = """\
 /* A block takes the packs through a part of a step, in the common case; it returns 0 where a lane meets a rare one, and
  * what it has written is then to be computed again by the complete functions. `times` and `gains` are those of its
@@ -28,7 +32,7 @@ PREAMBLE = """\
   const sl_time *times, const sl_v *restrict gains, double period, const sl_group *restrict p, \\
       const sl_group *restrict r, const sl_group *restrict x, const sl_group *restrict from, sl_group *restrict next, \\
       sl_group *restrict at, sl_group (*restrict kept)[SL_NX], sl_group *restrict slope, sl_group *restrict u, \\
-      sl_group *restrict e, sl_group *restrict sigma, sl_group *restrict wished, sl_group *restrict a_law
+      sl_group *restrict e, sl_group *restrict sigma, sl_group *restrict wished, sl_group *restrict a_law@SENSORS
 
 typedef struct {
   int (*compute)(SL_BLOCK_ARGUMENTS);
@@ -70,7 +74,7 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int, int], S
 
     def function(stages: Sequence[int], variant: str, gain: int) -> str:
         factors: dict[float, int] = {}
-        if chosen.span == "evaluation":
+        if chosen.span == "evaluation" or variant == "take":
             block = builder.evaluation(stages[0], variant)
         else:
             block = builder.stages(stages, variant, factors)
@@ -114,11 +118,12 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int, int], S
         rows.append(function(stages, builder.variants[0] if stages[0] == 0 else later, gain))
         if stages[0] == 0 and sampled:
             held = function(stages, "held", gain)
+    taken = function([0], "take", len(gains)) if builder.actuated else ""
     fused = int(chosen.span != "evaluation")
     text = [
         "/* ---- a step, block by block ---- */\n",
         "#define SL_BLOCKED 1",
-        PREAMBLE,
+        PREAMBLE.replace("@SENSORS", (_SENSORS if builder.measured else "") + (_ACTUATORS if builder.actuated else "")),
         *constants.text(chosen.groups),
         *text,
         f"#define SL_BLOCKED_TIMES {int(blocked_times)} /* whether kernel_times has what varies at a step's times */",
@@ -126,6 +131,7 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int, int], S
         f"enum {{ SL_BLOCKS = {len(spans)}, SL_PER_BLOCK = {len(spans[0])}, SL_GAINS = {len(gains)} }};",
         f"static const double sl_gain[SL_GAINS + 1] = {{{', '.join(map(literal, [*gains, 0.0]))}}};",
         f"static const sl_block sl_blocks[SL_BLOCKS] = {{{', '.join(rows)}}};",
+        *([f"static const sl_block sl_take = {taken};"] if taken else []),
         *(
             [f"static const sl_block sl_held = {held};", "#define SL_HELD sl_held"]
             if sampled
@@ -136,7 +142,10 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int, int], S
 
 
 class _Builder:
-    """Makes the blocks of a loop. Variants of the first stage: closed, or sample and held; of others: later."""
+    """Makes the blocks of a loop. Variants of the first stage: closed, or sample and held; of others: later.
+
+    Where motors are not driven by the command as it is, the sample is taken by a block of its own, take.
+    """
 
     def __init__(self, values: LoopValues, sampled: bool) -> None:
         self.values, self.sampled = values, sampled
@@ -144,12 +153,15 @@ class _Builder:
         program = values.program
         self.tableau = program.system.tableau
         self.n, self.plant, self.memory = program.system.n, program.size("x"), program.size("z")
+        self.actuated = bool(program.size("commanded"))
+        self.measured = program.size("measured")
         self.integrated = self.plant + (0 if sampled else self.memory)
 
     def evaluation(self, stage: int, variant: str) -> Block:
         """The slopes of one stage, into `slope`, at what `from` points to."""
         block = Block()
-        where = [block.load(f"from[{k}][@]") for k in range(self.integrated)]
+        at = "x" if variant == "take" else "from"
+        where = [block.load(f"{at}[{k}][@]") for k in range(self.integrated)]
         slopes = _Stages(self, block, stage).slopes(stage, variant, where)
         block.stores += [(f"slope[{k}][@]", place) for k, place in enumerate(slopes)]
         return block
@@ -219,7 +231,9 @@ class _Stages:
         self.instant = builder.tableau.when[first]
         self.expansion = Expansion(block, self.values, self._load)
         n = builder.n
-        self.command: Sequence[int] = [block.load(f"u[{k}][@]") for k in range(n)] if builder.sampled else []
+        self.command: Sequence[int] = (
+            [block.load(f"u[{k}][@]") for k in range(n)] if builder.sampled and not builder.actuated else []
+        )
 
     def slopes(self, stage: int, variant: str, at: Sequence[int]) -> Sequence[int]:
         """Slopes of a stage; what the first one shows is stored."""
@@ -233,15 +247,21 @@ class _Stages:
             places = self.expansion.values(wanted["closed"], where, instant)
             self._show(_SHOWN, places[len(at) :])
             return places[: len(at)]
-        if variant == "sample":
+        if variant == "take" or (variant == "sample" and not builder.actuated):  # else it has been taken before
             places = self.expansion.values(wanted["control"], where, instant)
             self._show(_SHOWN, places[: 5 * n])
             self.command = places[:n]
-            block.stores += [(f"next[{plant + k}][@]", place) for k, place in enumerate(places[5 * n :])]
+            shown, ahead = places[5 * n : 5 * n + builder.measured], places[5 * n + builder.measured :]
+            block.stores += [(f"measured[{k}][@]", place) for k, place in enumerate(shown)]
+            block.stores += [(f"next[{plant + k}][@]", place) for k, place in enumerate(ahead)]
+            if variant == "take":
+                return []
         elif variant == "held":
             self._show(("e", "sigma"), self.expansion.values(wanted["error"], where, instant))
             held = [(f"next[{plant + k}][@]", block.load(f"x[{plant + k}][@]")) for k in range(memory)]
             block.stores += held
+        if builder.actuated:
+            self.command = [block.load(f"acting[{instant}][{k}][@]") for k in range(n)]
         command = {("u", k): self.command[k] for k in range(n)}
         return self.expansion.values(wanted["plant"], where | command, instant)
 
@@ -254,6 +274,8 @@ class _Stages:
         source, k = self.values.graph.nodes[i].source
         if source == "z":  # with sampled control: held over the step
             return f"x[{self.builder.plant + k}][@]"
+        if source == "noise":
+            return f"noise[{k}][@]"
         return "slv_set(period)" if source == "h" else _given(self.values, i, instant)
 
 

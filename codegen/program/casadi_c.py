@@ -64,14 +64,34 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
     begin = "".join(
         f"\n  x[{states + k}][0] = slv_set({literal(value)});" for k, value in enumerate(program.system.z_start)
     )
-    control = call("control", w, s, *at, p, r, results=results)
+    measured, noisy = program.size("measured"), program.size("noise")
+    noise = (f"{flat}noise",) if noisy else ()
+    shown = ["(double *)measured"] if measured else []
+    control = call("control", w, s, *at, *noise, p, r, results=[*results, *shown])
     sampling, sampled, sample = state, computed, control
+    if measured:
+        sampling, sampled = state.replace("*x,", "*x, const sl_group *noise,"), f"{computed}, sl_group *measured"
     closed = "  kernel_control(now, x, p, r, u, e, sigma, wished, a_law);"
     if memory:
-        sampling, sampled = state.replace("*x,", "*x, double period,"), f"{computed}, sl_group *ahead"
-        update = call("update", w, s, *at, "&period", p, r, results=["(double *)ahead"])
-        rates = call("rates", w, s, *at, p, r, results=[f"(double *)(dx + {states})"])
+        before = "*noise," if measured else "*x,"
+        sampling, sampled = sampling.replace(before, f"{before} double period,"), f"{sampled}, sl_group *ahead"
+        update = call("update", w, s, *at, *noise, "&period", p, r, results=["(double *)ahead"])
+        rates = call("rates", w, s, *at, *noise, p, r, results=[f"(double *)(dx + {states})"])
         sample, closed = f"{control}\n{update}", f"{control}\n{rates}"
+    actuated, actuate = "actuate" in functions, ""
+    if actuated:
+        given = "double step, const sl_group *arrived, const sl_group *m, const sl_group *p, const sl_group *r"
+        results = ["(double *)acting", "(double *)ahead"]
+        body = call("actuate", f"{flat}arrived", f"{flat}m", "&step", p, results=results)
+        actuate = f"static inline void kernel_actuate({given}, sl_group *acting, sl_group *ahead) {{\n{body}\n}}\n\n"
+    if not measured and not actuated:  # continuous control has no samples, and so nothing that is measured at them
+        closed = f"""static inline void kernel_closed({state}, sl_group *dx, {computed}) {{
+{closed}
+  kernel_plant(now, x, (const sl_group *)u, p, r, dx);
+}}
+"""
+    else:
+        closed = ""
     tip = ""
     if "tip" in functions:
         given = "double t, const double *d, const sl_group *x, const sl_group *p, const sl_group *r, sl_group *tip"
@@ -83,7 +103,7 @@ enum {{ SL_NUMBER_W = {program.size("w")} }};
 #define CASADI_SYMBOL_EXPORT __attribute__((visibility("hidden")))
 #include "functions.c"
 
-static inline void kernel_run(const sl_group *p, sl_group *r) {{
+static inline void kernel_run(const sl_group *p, {"double step, " * actuated}sl_group *r) {{
 {call("run", p, results=["(double *)r"])}
 }}
 
@@ -108,7 +128,7 @@ static inline void kernel_signals(sl_time now, const sl_group *p, const sl_group
   for (i = 0; i < SL_NF; i++) b[SL_NB + i][0] = now.varying[SL_NUMBER_W - SL_NF + i][0];
 }}
 
-{tip}static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
+{actuate}{tip}static inline void kernel_error({state}, sl_group *e, sl_group *sigma) {{
 {call("error", w, s, *at, p, r, results=["(double *)e", "(double *)sigma"])}
 }}
 
@@ -121,9 +141,5 @@ static inline void kernel_plant(sl_time now, const sl_group *x, const sl_group *
 {call("plant", w, s, x, flat + "u", p, r, results=["(double *)dx"])}
 }}
 
-static inline void kernel_closed({state}, sl_group *dx, {computed}) {{
-{closed}
-  kernel_plant(now, x, (const sl_group *)u, p, r, dx);
-}}
-"""
+{closed}"""
     return {"kernel.h": text, "functions.c": print_functions(list(functions.values()), "functions")}

@@ -13,6 +13,15 @@ and where the controller has states, which error and control then take after x,
     rates(w, s, x, z, p, r) -> dz
     update(w, s, x, z, h, p, r) -> z_next   (one sample of h seconds later)
 
+and where sensors are noisy, which control, rates and update then take behind these states (and where sensors show
+anything but the state, control gives that too, as its last output)
+
+    noise   standard normal numbers of the sample, one for each entry of x
+
+and where motors are not driven by the command as it is
+
+    actuate(arrived, m, step, p) -> acting, m_next   (once a step: forces at its nodes, what motors remember)
+
 and where the arm has a tip, for the rows of a trajectory, so that it is computed nowhere else
 
     tip(t, d, x, p) -> tip
@@ -29,6 +38,7 @@ from functools import lru_cache
 import casadi as ca
 
 from springline.codegen.program.staging import split
+from springline.model.quantities import entries
 from springline.model.structure import Structure
 from springline.model.symbolic import as_written, derivation
 from springline.model.system import System, system_of
@@ -42,13 +52,17 @@ class Program:
     functions: dict[str, ca.Function]
 
     def size(self, name: str) -> int:
-        """Number of entries of a vector of the loop: t, d, p, r, w, s, x, z, u, e."""
+        """Number of entries of a vector of the loop: t, d, p, r, w, s, x, z, u, e, noise, measured."""
         sizes = {
             "p": self.system.p.numel(),
             "d": self.system.d.numel(),
             "w": self.system.w.numel(),
             "x": self.system.x.numel(),
             "z": self.system.z.numel(),
+            "m": self.system.m.numel(),
+            "commanded": self.system.n if self.system.commanded else 0,
+            "noise": self.system.noise.numel(),
+            "measured": len(entries(self.system.measured, self.system.joints)),
             "u": self.system.n,
             "e": self.system.n,
             "t": 1,
@@ -76,6 +90,7 @@ def program(structure: Structure) -> Program:
     system = system_of(structure)
     t, d, w, x, u, p = system.t, system.d, system.w, system.x, system.u, system.p
     z = [system.z] if system.memory else []
+    noise = [system.noise] if system.noise.numel() else []
     later = ("rates", "update") if z else ()
     loop = {name: system.function(f"loop_{name}") for name in ("error", "control", "plant", *later)}
     sources = {"signals": system.function("signals"), "start": system.function("start"), **loop}
@@ -83,10 +98,10 @@ def program(structure: Structure) -> Program:
         "signals": [t, d, p],
         "start": [t, d, p],
         "error": [w, x, *z, p],
-        "control": [w, x, *z, p],
+        "control": [w, x, *z, *noise, p],
         "plant": [w, x, u, p],
-        "rates": [w, x, *z, p],
-        "update": [w, x, *z, system.h, p],
+        "rates": [w, x, *z, *noise, p],
+        "update": [w, x, *z, *noise, system.h, p],
     }
 
     with as_written():
@@ -108,6 +123,8 @@ def program(structure: Structure) -> Program:
             staged[name], late = late[:count], late[count:]
         r, s = run.symbols, time.symbols
         at, names_at = [w, s, x, *z], ["w", "s", "x", *(["z"] if z else [])]
+        sampling, names_sampling = [*at, *noise], [*names_at, *(["noise"] if noise else [])]
+        measured = ["measured"] if system.measured else []
         signature = {
             "run": ([p], [run.values], ["p"], ["r"]),
             "start": ([t, d, p, r], staged["start"], ["t", "d", "p", "r"], ["x"]),
@@ -115,19 +132,20 @@ def program(structure: Structure) -> Program:
             "time": ([w, p, r], [time.values], ["w", "p", "r"], ["s"]),
             "error": ([*at, p, r], staged["error"], [*names_at, "p", "r"], ["e", "sigma"]),
             "control": (
-                [*at, p, r],
+                [*sampling, p, r],
                 staged["control"],
-                [*names_at, "p", "r"],
-                ["u", "e", "sigma", "wished", "a_law"],
+                [*names_sampling, "p", "r"],
+                ["u", "e", "sigma", "wished", "a_law", *measured],
             ),
             "plant": ([w, s, x, u, p, r], staged["plant"], ["w", "s", "x", "u", "p", "r"], ["dx"]),
         }
         if z:
             signature |= {
-                "rates": ([*at, p, r], staged["rates"], [*names_at, "p", "r"], ["dz"]),
-                "update": ([*at, system.h, p, r], staged["update"], [*names_at, "h", "p", "r"], ["z_next"]),
+                "rates": ([*sampling, p, r], staged["rates"], [*names_sampling, "p", "r"], ["dz"]),
+                "update": ([*sampling, system.h, p, r], staged["update"], [*names_sampling, "h", "p", "r"], ["z_next"]),
             }
         observed = {"tip": system.function("loop_tip")} if system.tip is not None else {}
+        observed |= {"actuate": system.function("loop_actuate")} if system.commanded else {}
         functions = {
             name: ca.Function(f"loop_{name}", ins, ca.cse([ca.densify(o) for o in outs]), names_in, names_out)
             for name, (ins, outs, names_in, names_out) in signature.items()

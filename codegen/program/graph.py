@@ -187,6 +187,11 @@ class LoopGraph(ValueGraph):
         x = [self.leaf("x", i, Binding.STATE) for i in range(program.size("x"))]
         u = [self.leaf("u", i, Binding.STATE) for i in range(program.size("u"))]
         z = [[self.leaf("z", i, Binding.STATE) for i in range(program.size("z"))]] if program.size("z") else []
+        noise = (
+            [[self.leaf("noise", i, Binding.STATE) for i in range(program.size("noise"))]]
+            if program.size("noise")
+            else []
+        )
         functions = program.functions
         [r] = self.add("run", functions["run"], [p])
         beginning = [self.leaf("begin", 0, Binding.STATE)]
@@ -194,18 +199,25 @@ class LoopGraph(ValueGraph):
         self.add("start", functions["start"], [beginning, first, p, r])
         if "tip" in functions:
             self.add("tip", functions["tip"], [beginning, first, x, p])
+        if "actuate" in functions:
+            arrived, m = (
+                [self.leaf(name, i, Binding.STATE) for i in range(size)]
+                for name, size in (("arrived", program.size("u")), ("m", program.size("m")))
+            )
+            self.add("actuate", functions["actuate"], [arrived, m, [self.leaf("step", 0, Binding.RUN)], p])
         [w] = self.add("signals", functions["signals"], [t, d, p, r])
         [s] = self.add("time", functions["time"], [w, p, r])
         self.add("error", functions["error"], [w, s, x, *z, p, r])
-        [command, *_] = self.add("control", functions["control"], [w, s, x, *z, p, r])
+        at = [w, s, x, *z]
+        [command, *_] = self.add("control", functions["control"], [*at, *noise, p, r])
         self.add("plant", functions["plant"], [w, s, x, u, p, r])
         self.add("closed", functions["plant"], [w, s, x, command, p, r])
         if z:
-            self.add("rates", functions["rates"], [w, s, x, *z, p, r])
-            self.add("update", functions["update"], [w, s, x, *z, [self.leaf("h", 0, Binding.STATE)], p, r])
+            self.add("rates", functions["rates"], [*at, *noise, p, r])
+            self.add("update", functions["update"], [*at, *noise, [self.leaf("h", 0, Binding.STATE)], p, r])
         system = program.system
         self.labels = {
-            "control": self._labelled(system, "control", [w, x, *z, p]),
+            "control": self._labelled(system, "control", [w, x, *z, *noise, p]),
             "plant": self._labelled(system, "plant", [w, x, u, p]),
             "closed": self._labelled(system, "plant", [w, x, command, p]),
         }

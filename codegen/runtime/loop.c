@@ -10,6 +10,10 @@
  *   kernel_run, kernel_start, kernel_uniform, kernel_varying, kernel_signals; kernel_tip, for rows alone, where SL_NTIP > 0
  *   kernel_times, where SL_BLOCKED_TIMES: all that kernel_varying computes at the times of a step, in the common case
  *   the metrics: SL_METRICS_PER_JOINT, sl_sample, sl_metrics, kernel_sample, kernel_metrics_start, _sample and _finish
+ *   SL_NMEASURED, SL_NNOISE, where sensors show at samples anything but the state: numbers that they show, and random
+ *                numbers that they take
+ *   SL_ACTUATED, SL_DELAY, SL_NM, where motors are not driven by the command as it is: steps of delay, numbers that are
+ *                remembered; kernel_actuate gives the forces at the nodes of a step
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
  *                needed for long), sl_node, sl_when, sl_kept, kernel_update
@@ -26,13 +30,40 @@
 #include "kernel.h"
 #include "simulate.h"
 
+#ifndef SL_NMEASURED
+#define SL_NMEASURED 0
+#define SL_NNOISE 0
+#endif
+#if SL_NNOISE > 0
+#include "sl_noise.h"
+#endif
+#ifndef SL_ACTUATED
+#define SL_ACTUATED 0
+#define SL_COMMAND pack->u
+#define SL_ACTING_AT(node) pack->u
+#define SL_ACTING_GIVEN
+#else
+#define SL_COMMAND pack->command
+#define SL_ACTING_AT(node) pack->acting[node]
+#define SL_ACTING_GIVEN , pack->acting + chosen->instant
+#endif
+#if SL_NMEASURED > 0
+#define SL_NOISE_GIVEN (const sl_group *)pack->noise,
+#define SL_MEASURED_TAKEN , pack->measured
+#define SL_MEASURED_TAKEN_BY_BLOCK , (const sl_group *)pack->noise, pack->measured
+#else
+#define SL_NOISE_GIVEN
+#define SL_MEASURED_TAKEN
+#define SL_MEASURED_TAKEN_BY_BLOCK
+#endif
+
 enum {
   SL_PACK = SL_W * SL_G,
   SL_NMETRICS = SL_NJ * SL_METRICS_PER_JOINT,
   SL_BLOCK = (SL_INSTANTS + SL_W - 1) / SL_W * SL_W, /* instants whose uniform signals are evaluated together */
   SL_NPLANT = SL_NX - SL_NZ,
   SL_NSIGMA = SL_NJ * SL_SLIDING,
-  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB + SL_NF + SL_NTIP
+  SL_NCOLUMNS = 1 + SL_NX + 3 * SL_NJ + SL_NSIGMA + SL_NB + SL_NF + SL_NTIP + SL_NMEASURED + SL_ACTUATED * SL_NJ
 };
 
 /* ---- signals ------------------------------------------------------------------------------------------- */
@@ -89,6 +120,18 @@ typedef struct {
   sl_time times[SL_INSTANTS + 1];                 /* the nodes of the step, and its end */
   sl_group varying[SL_INSTANTS + 1][SL_NV + 1];   /* what varies at these times, in turn */
   sl_group low[SL_NJ], high[SL_NJ]; /* limits of q1, where the job has some; those of a lane that has ended are none */
+#if SL_NMEASURED > 0
+  sl_group noise[SL_NNOISE + 1], measured[SL_NMEASURED]; /* of the last sample */
+#endif
+#if SL_ACTUATED
+  sl_group command[SL_NJ];                  /* of the controller; u is what acts */
+  sl_group line[SL_DELAY + 1][SL_NJ];       /* commands that have not arrived, that of step k at k % SL_DELAY */
+  sl_group m[SL_NM + 1];                    /* what motors remember */
+  sl_group acting[SL_INSTANTS + 1][SL_NJ];  /* at the nodes of the step, and at its end */
+#endif
+#if SL_NNOISE > 0
+  sl_b number[SL_G]; /* that the noise of a run goes by */
+#endif
   int64_t samples;                  /* that the metrics have seen */
   sl_metrics metrics[SL_NJ][SL_G];
   sl_clock *clock;
@@ -146,6 +189,12 @@ static void write_row(sl_pack *pack, int64_t k, sl_time now, int lane, int end) 
     for (i = 0; i < SL_NB + SL_NF; i++) *row++ = lane_of(b[i], lane);
 #if SL_NTIP > 0
     for (i = 0; i < SL_NTIP; i++) *row++ = lane_of(tip[i], lane);
+#endif
+#if SL_NMEASURED > 0
+    for (i = 0; i < SL_NMEASURED; i++) *row++ = lane_of(pack->measured[i], lane);
+#endif
+#if SL_ACTUATED
+    for (i = 0; i < SL_NJ; i++) *row++ = lane_of(pack->command[i], lane);
 #endif
   }
 }
@@ -209,6 +258,11 @@ static void stop_runaways(sl_pack *pack, int64_t k, double bound) {
       finish_lane(pack, lane, k, status, bad < SL_NPLANT ? bad : bad + 3 * SL_NJ + SL_NSIGMA);
     }
     for (i = 0; i < SL_NX; i++) set_lane(pack->next[i], lane, 0.0);
+#if SL_ACTUATED
+    for (i = 0; i < SL_NM; i++) set_lane(pack->m[i], lane, 0.0);
+    for (i = 0; i < SL_NJ; i++) set_lane(pack->command[i], lane, 0.0);
+    for (i = 0; i < SL_DELAY * SL_NJ; i++) set_lane(pack->line[i / SL_NJ][i % SL_NJ], lane, 0.0);
+#endif
   }
 }
 
@@ -269,16 +323,34 @@ static void observe(sl_pack *pack, int64_t k, sl_time now) {
 }
 
 #if SL_SAMPLED
+#if SL_NNOISE > 0
+/* Random numbers of step k, where that is a sample. */
+static void draw_noise(sl_pack *pack, int64_t k) {
+  const sl_b none = {0};
+  int block, i, g;
+  if (k % pack->job->hold != 0) return;
+  for (g = 0; g < SL_G; g++) {
+    for (block = 0; 4 * block < SL_NNOISE; block++) {
+      sl_v z[4];
+      slv_noise(none + (uint64_t)pack->job->seed, pack->number[g], none + (uint64_t)(k / pack->job->hold),
+                none + (uint64_t)block, z);
+      for (i = 0; i < 4 && 4 * block + i < SL_NNOISE; i++) pack->noise[4 * block + i][g] = z[i];
+    }
+  }
+}
+#endif
+
 /* Control of step k: a new sample, or the held one with its error and sliding variable. */
 static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
   const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
   if (k % pack->job->hold == 0) {
 #if SL_NZ > 0
     const double period = (double)pack->job->hold * pack->job->step;
-    kernel_control(now, x, period, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law,
-                   pack->next + SL_NPLANT);
+    kernel_control(now, x, SL_NOISE_GIVEN period, p, r, SL_COMMAND, pack->e, pack->sigma, pack->wished,
+                   pack->a_law SL_MEASURED_TAKEN, pack->next + SL_NPLANT);
 #else
-    kernel_control(now, x, p, r, pack->u, pack->e, pack->sigma, pack->wished, pack->a_law);
+    kernel_control(now, x, SL_NOISE_GIVEN p, r, SL_COMMAND, pack->e, pack->sigma, pack->wished,
+                   pack->a_law SL_MEASURED_TAKEN);
 #endif
   } else {
     kernel_error(now, x, p, r, pack->e, pack->sigma);
@@ -289,13 +361,44 @@ static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
 }
 #endif
 
+#if SL_ACTUATED
+/* Of step k: its sample, if it has one, and what the motors are driven by at its nodes. */
+static void drive_motors(sl_pack *pack, int64_t k, sl_time now) {
+  const sl_group *arrived = (const sl_group *)pack->command;
+  sl_group ahead[SL_NM + 1], late[SL_NJ];
+  if (k % pack->job->hold == 0) {
+    int fine = 0;
+#if SL_BLOCKED
+    const sl_group *x = (const sl_group *)pack->x;
+    sl_group unused[SL_NX];
+    fine = sl_take.compute(&now, (const sl_v *)pack->gains, (double)pack->job->hold * pack->job->step,
+                           (const sl_group *)pack->p, (const sl_group *)pack->r, x,
+                           (const sl_group *)pack->at[1], pack->next, pack->at[0], pack->kept, unused, pack->command, pack->e, pack->sigma, pack->wished,
+                           pack->a_law SL_MEASURED_TAKEN_BY_BLOCK, pack->acting);
+#endif
+    if (!fine) sample_control(pack, k, now);
+  }
+#if SL_DELAY > 0
+  memcpy(late, pack->line[k % SL_DELAY], sizeof late);
+  memcpy(pack->line[k % SL_DELAY], pack->command, sizeof late);
+  arrived = (const sl_group *)late;
+#else
+  (void)late;
+#endif
+  kernel_actuate(pack->job->step, arrived, (const sl_group *)pack->m, (const sl_group *)pack->p,
+                 (const sl_group *)pack->r, pack->acting[0], ahead);
+  memcpy(pack->m, ahead, SL_NM * sizeof(sl_group));
+  memcpy(pack->u, pack->acting[0], sizeof pack->u);
+}
+#endif
+
 /* A stage of step k by the complete functions; e, sigma and u become those at the start of the step. */
 static void run_stage(sl_pack *pack, int64_t k, int stage, const sl_group *from, sl_group *slope) {
   const sl_group *x = (const sl_group *)pack->x, *p = (const sl_group *)pack->p, *r = (const sl_group *)pack->r;
   const sl_group *at = stage == 0 ? x : from;
 #if SL_SAMPLED
-  if (stage == 0) sample_control(pack, k, pack->times[0]);
-  kernel_plant(pack->times[sl_when[stage]], at, (const sl_group *)pack->u, p, r, slope);
+  if (stage == 0 && (!SL_ACTUATED || k % pack->job->hold != 0)) sample_control(pack, k, pack->times[0]);
+  kernel_plant(pack->times[sl_when[stage]], at, (const sl_group *)SL_ACTING_AT(sl_when[stage]), p, r, slope);
 #else
   (void)k;
   if (stage == 0) {
@@ -312,6 +415,12 @@ static void run_block(sl_pack *pack, int64_t k, int block) {
   const sl_group *x = (const sl_group *)pack->x;
   sl_group *from = pack->at[block & 1], *to = pack->at[(block + 1) & 1], once[SL_NX];
   int stage = block * SL_PER_BLOCK, end = stage + SL_PER_BLOCK, fine = 0;
+#if SL_NNOISE > 0
+  if (block == 0) draw_noise(pack, k);
+#endif
+#if SL_ACTUATED
+  if (block == 0) drive_motors(pack, k, pack->times[0]);
+#endif
 #if SL_BLOCKED
   const sl_block *chosen = SL_SAMPLED && block == 0 && k % pack->job->hold != 0 ? &SL_HELD : &sl_blocks[block];
   const int seen = block == 0 || SL_SAMPLED; /* what later stages compute of the control is only theirs */
@@ -321,7 +430,7 @@ static void run_block(sl_pack *pack, int64_t k, int block) {
                          pack->kept, sl_kept[stage] < 0 ? once : pack->kept[sl_kept[stage]],
                          seen ? pack->u : pack->unseen[0], seen ? pack->e : pack->unseen[1],
                          seen ? pack->sigma : pack->unseen[2], seen ? pack->wished : pack->unseen[3],
-                         seen ? pack->a_law : pack->unseen[4]);
+                         seen ? pack->a_law : pack->unseen[4] SL_MEASURED_TAKEN_BY_BLOCK SL_ACTING_GIVEN);
 #endif
   if (!SL_LIKELY(fine && SL_FUSED)) {
     for (; stage < end; stage++, from = to) {
@@ -336,7 +445,14 @@ static void run_block(sl_pack *pack, int64_t k, int block) {
 /* e, sigma and u at the end of the run. */
 static void control_at_end(sl_pack *pack, int64_t k, sl_time now) {
 #if SL_SAMPLED
-  sample_control(pack, k, now);
+#if SL_NNOISE > 0
+  draw_noise(pack, k);
+#endif
+#if SL_ACTUATED
+  drive_motors(pack, k, now);
+  if (k % pack->job->hold != 0)
+#endif
+    sample_control(pack, k, now);
 #else
   sl_group slope[SL_NX];
   kernel_closed(now, (const sl_group *)pack->x, (const sl_group *)pack->p, (const sl_group *)pack->r, slope, pack->u,
@@ -361,12 +477,22 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
     pack->alive[lane] = lane < pack->lanes;
     for (i = 0; i < SL_NP; i++) set_lane(pack->p[i], lane, job->parameters[run * SL_NP + i]);
     if (lane < pack->lanes && job->rows) job->rows[run] = 0;
+#if SL_NNOISE > 0
+    SL_LANE(pack->number[lane / SL_W], lane % SL_W) = job->numbers ? (uint64_t)job->numbers[run] : 0;
+#endif
     if (job->limits) set_limits(pack, lane, lane < pack->lanes ? job->limits : NULL);
   }
 #if SL_BLOCKED
   for (i = 0; i < SL_GAINS; i++) pack->gains[i] = slv_set(sl_gain[i] * job->step);
 #endif
+#if SL_ACTUATED
+  memset(pack->command, 0, sizeof pack->command);
+  memset(pack->line, 0, sizeof pack->line);
+  memset(pack->m, 0, sizeof pack->m);
+  kernel_run((const sl_group *)pack->p, job->step, pack->r);
+#else
   kernel_run((const sl_group *)pack->p, pack->r);
+#endif
   sl_table_data(job->tables, SL_NTABLES, job->start_time, d, 1);
   kernel_start(job->start_time, d, (const sl_group *)pack->p, (const sl_group *)pack->r, pack->x);
   pack->times[0].varying = (const sl_group *)pack->varying[0];

@@ -19,4 +19,5 @@ def loop_settings(scenario: Scenario, *, trajectory: bool) -> LoopSettings:
         response_error=scenario.response_error,
         settling_error=scenario.settling_error,
         limits=scenario.limits,
+        seed=scenario.seed,
     )

@@ -103,7 +103,10 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
             progress(crew.underway() / settings.steps)
 
     with Crew(1) as crew:  # a thread of its own, so that Ctrl-C and a progress bar reach a long run
-        [runs] = results([crew.begin(lambda watch: loop.run(values, settings, tables, watch=watch))], report)
+        [runs] = results(
+            [crew.begin(lambda watch: loop.run(values, settings, tables, numbers=[scenario.run_number], watch=watch))],
+            report,
+        )
     system = scenario.system()
     assert runs.trajectory is not None and runs.rows is not None
     rows = runs.trajectory[0, : runs.rows[0]]

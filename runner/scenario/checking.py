@@ -16,6 +16,7 @@ from springline.model.base import ALIASES, COORDINATES
 from springline.model.base_motion import MOTIONS
 from springline.model.corners import corners
 from springline.model.drive import DRIVES, DriveKind
+from springline.model.hardware import ACTUATORS, LONGEST_DELAY, SENSORS
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import POSITIVE
 from springline.runner.files import InputError, Problem, unknown
@@ -93,6 +94,8 @@ def resolve(
     problems += _via_point_problems(document["reference"], where)
     problems += _exponent_problems(document["control"], where)
     problems += _sampling_problems(document, given["control"], where)
+    problems += _hardware_problems(document, where)
+    problems += _delay_problems(document, where)
     problems += _whole_problems(document, "simulation.duration", where)
     duration = document["simulation"].get("duration")
     units = {
@@ -288,6 +291,32 @@ def _sampling_problems(document: Document, given: Mapping[str, object], where: s
     if control.get("mode") != "sampled":  # else a forgotten mode would go unnoticed
         return [Problem(where, key, 'only goes with control.mode = "sampled"', 'mode = "continuous"')]
     return _whole_problems(document, key, where)
+
+
+def _hardware_problems(document: Document, where: str) -> list[Problem]:
+    """What sensors show, and when commands arrive, is of samples, which a continuous control has none of."""
+    control = document["control"]
+    if "mode" not in control or control["mode"] == "sampled":
+        return []
+    there = [
+        f"{effect.table}.{effect.name}"
+        for effect in (*SENSORS, *ACTUATORS)
+        if any(value != effect.absent for value in document[effect.table].get(effect.name, ()))
+    ]
+    there += ["actuator.delay"] if document["actuator"].get("delay") else []
+    text = 'only goes with control.mode = "sampled"'
+    return [Problem(where, key, text, 'mode = "continuous"') for key in there]
+
+
+def _delay_problems(document: Document, where: str) -> list[Problem]:
+    """A delay is so many steps, which all are remembered."""
+    delay, step = document["actuator"].get("delay"), document["simulation"].get("step")
+    if not delay or step is None:
+        return []
+    if delay / step > LONGEST_DELAY:
+        text = f"expected at most {LONGEST_DELAY * step:.6g} s, {LONGEST_DELAY} times simulation.step = {step!r} s"
+        return [Problem(where, "actuator.delay", text, f"{delay!r} s")]
+    return _whole_problems(document, "actuator.delay", where)
 
 
 def _whole_problems(document: Document, key: str, where: str) -> list[Problem]:

@@ -21,6 +21,7 @@ from springline.model.base import COORDINATES, shortest
 from springline.model.base_motion import MOTIONS, moving_terms
 from springline.model.control import CONTROLLERS, INPUT, LAWS, OBSERVERS, LogForm, ObserverInput, SurfaceExponents
 from springline.model.drive import DRIVES, FRICTION, DriveKind
+from springline.model.hardware import ACTUATORS, EFFECTS, SENSORS
 from springline.model.mechanisms import MECHANISMS, Implausible
 from springline.model.structure import Feedforward, MotorStart, SignalKind, SignalShape, Structure
 from springline.model.system import System, system_of
@@ -141,6 +142,21 @@ class Scenario:
         return float(self._simulation.get("settling_error", 0.0))
 
     @property
+    def seed(self) -> int:
+        """What the noise of sensors is drawn with."""
+        return int(self.document["sensor"]["seed"])
+
+    @property
+    def run_number(self) -> int:
+        """The number of the run that the noise goes by: 0, or which run of a batch it is."""
+        return int(self.document["sensor"]["run"])
+
+    @property
+    def noisy(self) -> bool:
+        """Whether sensors are noisy."""
+        return any(EFFECTS[name].noisy for name in self.structure().effects)
+
+    @property
     def _simulation(self) -> dict[str, Any]:
         return self.document["simulation"]
 
@@ -178,6 +194,12 @@ class Scenario:
             size=size,
             disturbance=disturbance if disturbance.kind != "none" else SignalShape(),
             friction=tuple(item.name for item in FRICTION if self._has(item.name)),
+            effects=tuple(
+                effect.name
+                for effect in (*SENSORS, *ACTUATORS)
+                if any(value != effect.absent for value in self.document[effect.table][effect.name])
+            ),
+            delay=round(self.document["actuator"]["delay"] / self.step),
         )
 
     def _has(self, name: str) -> bool:
@@ -309,12 +331,12 @@ class Scenario:
     # Changed and written
 
     def including(self, values: Mapping[str, ArrayLike]) -> Scenario:
-        """This scenario, with the damping and friction that `values` (dotted key -> numbers) have beyond zero.
+        """This scenario, with damping, friction and effects of sensors that `values` (key -> numbers) have beyond zero.
 
         What is zero is no number of the structure, and so none that could vary: it becomes the largest of its numbers.
         Raises InputError.
         """
-        present = self.structure().friction
+        present = (*self.structure().friction, *self.structure().effects)
         added: dict[str, float] = {}
         for key, numbers in values.items():
             if absent_at_zero(key) and key.split(".")[1] not in present:
@@ -472,7 +494,12 @@ class Scenario:
         drive = overrides.get("drive.kind", document["drive"]["kind"])
         if overrides.get("mechanism.name", mechanism) != mechanism:
             control = {k: _without_lists(v) for k, v in document["control"].items() if not isinstance(v, list)}
-            document = {name: document[name] for name in ("base_motion", "simulation")} | {"control": control}
+            hardware = {
+                table: {k: v for k, v in document[table].items() if not isinstance(v, list)}
+                for table in ("sensor", "actuator")
+            }
+            document = {name: document[name] for name in ("base_motion", "simulation")}
+            document |= {"control": control} | hardware
             document["drive"] = {"kind": drive}
         elif overrides.get(f"mechanism.{schema.SIZE}", self.structure().size) != self.structure().size:
             document = self._resized(document, overrides[f"mechanism.{schema.SIZE}"])
@@ -505,7 +532,8 @@ class Scenario:
         What differs from joint to joint stays a list, which is found to have too few or too many entries.
         """
         spread = {
-            name: _without_equal(document[name]) for name in ("mechanism", "drive", "plant", "control", "initial")
+            name: _without_equal(document[name])
+            for name in ("mechanism", "drive", "plant", "control", "sensor", "actuator", "initial")
         }
         name = self.structure().mechanism
         kept = {joint.name for joint in MECHANISMS[name].of_size(size_given(name, {schema.SIZE: size})).joints}
@@ -646,7 +674,11 @@ def weighs(key: str) -> bool:
 
 
 def absent_at_zero(key: str) -> bool:
-    """Whether a dotted key is a damping or friction, which a structure has only where it is not zero."""
+    """Whether a dotted key is damping, friction or of a sensor: a structure has it only where it is not zero."""
     table, _, rest = key.partition(".")
     name, _, place = rest.partition(".")
-    return table in ("drive", "plant") and name in {item.name for item in FRICTION} and (not place or place.isdecimal())
+    if place and not place.isdecimal():
+        return False
+    if table in ("sensor", "actuator"):
+        return name in EFFECTS and EFFECTS[name].table == table and EFFECTS[name].absent == 0.0
+    return table in ("drive", "plant") and name in {item.name for item in FRICTION}

@@ -14,15 +14,16 @@ from typing import Annotated, Any, Literal, cast, get_args
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError, create_model
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
-from springline.codegen.kernel import MOST_STEPS
+from springline.codegen.kernel import LARGEST_SEED, MOST_STEPS
 from springline.codegen.numbers import double
 from springline.model.base import COORDINATES, MOUNT, MOUNT_RPY
 from springline.model.base_motion import MOTIONS
 from springline.model.control import CONTROLLERS, INPUT, LARGEST_SURFACE_EXPONENT, LAWS, OBSERVERS, LogForm
 from springline.model.drive import DRIVES, EPSILON, DriveKind, friction_parameters
+from springline.model.hardware import ACTUATORS, SENSORS
 from springline.model.integrators import INTEGRATORS
 from springline.model.mechanisms import MECHANISMS, Mechanism
-from springline.model.parameters import LIMIT, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
+from springline.model.parameters import LIMIT, NON_NEGATIVE, POSITIVE, REAL, UNIT_OPEN, Bounds, Joint, Parameter
 from springline.model.registry import Registry
 from springline.model.structure import Feedforward, Structure
 from springline.model.system import control_parameters, own_control_tables
@@ -128,6 +129,18 @@ def whole(most: int, *, odd: bool = False) -> Leaf:
 
     def check(value: object) -> int:
         if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= most and (value % 2 or not odd):
+            return value
+        raise _wrong(f"expected {expected}")
+
+    return Leaf(expected, check)
+
+
+def count(most: int) -> Leaf:
+    """An integer from 0 up to `most`."""
+    expected = f"an integer from 0 to {most}"
+
+    def check(value: object) -> int:
+        if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= most:
             return value
         raise _wrong(f"expected {expected}")
 
@@ -334,7 +347,21 @@ class Schema:
     kinds: Mapping[str, Mapping[str, type[Section]]]
 
 
-TABLES = ("mechanism", "drive", "plant", "control", "reference", "base_motion", "disturbance", "initial", "simulation")
+TABLES = (
+    *(
+        "mechanism",
+        "drive",
+        "plant",
+        "control",
+        "sensor",
+        "actuator",
+        "reference",
+        "base_motion",
+        "disturbance",
+        "initial",
+    ),
+    "simulation",
+)
 
 
 DEFAULT_KINDS = {"drive": "elastic", "reference": "sine", "base_motion": "none", "disturbance": "none"}
@@ -396,6 +423,8 @@ def schema(
             ),
             "plant": _section("plant", {item.name: _plant(item, joints) for item in (*arm, *moving)}),
             "control": _section("control", shared | tables, ControlStructure),
+            "sensor": _section("sensor", _sensor(joints)),
+            "actuator": _section("actuator", _actuator(joints)),
             "initial": _section("initial", initial),
             "simulation": Simulation,
         },
@@ -414,6 +443,21 @@ def schema(
             },
         },
     )
+
+
+def _sensor(joints: Sequence[Joint]) -> dict[str, Any]:
+    """[sensor]: what sensors do to what they show, and what their noise goes by."""
+    return {
+        **_numbers([item for effect in SENSORS for item in effect.parameters], joints),
+        "seed": (Annotated[int, count(LARGEST_SEED)], 0),
+        "run": (Annotated[int, count(MOST_STEPS)], 0),
+    }
+
+
+def _actuator(joints: Sequence[Joint]) -> dict[str, Any]:
+    """[actuator]: what becomes of a command on its way to the motors' force."""
+    delay = {"delay": (Annotated[float, number("s", NON_NEGATIVE)], 0.0)}
+    return delay | _numbers([item for effect in ACTUATORS for item in effect.parameters], joints)
 
 
 def _size(mechanism: Mechanism) -> dict[str, Any]:

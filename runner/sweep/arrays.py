@@ -72,5 +72,5 @@ def _over_threads(work: Work, parameters: Floats, jobs: int | None) -> Runs:
     with open_pool(jobs) as pool:
         packs = -(-len(parameters) // width)
         size = width * max(1, packs // (_CHUNKS_PER_THREAD * pool.threads))
-        futures = [pool.submit(work, parameters[i : i + size], ()) for i in range(0, len(parameters), size)]
+        futures = [pool.submit(work, parameters[i : i + size], (), i) for i in range(0, len(parameters), size)]
         return joined([outcome.runs for outcome in results(futures)])

@@ -237,7 +237,8 @@ class Plan:
         chunk = self.chunk_of(run)
         columns = self.columns(chunk)
         numbers = {key: float(columns[key][run - chunk.first]) for key in columns if key in self._numeric}
-        return chunk.group.scenario.with_overrides(numbers)
+        scenario = chunk.group.scenario
+        return scenario.with_overrides(numbers | ({"sensor.run": run} if scenario.noisy else {}))
 
     def table(self, chunk: Chunk, columns: Columns, outcome: Outcome) -> pa.Table:
         """One row a run of a chunk with the given columns: run, every key of the sweep, every metric, status, t_end."""

@@ -37,8 +37,8 @@ class Pool(Protocol):
         """How many chunks are simulated at a time."""
         ...
 
-    def submit(self, work: Work, parameters: Floats, kept: Sequence[int]) -> Future[Outcome]:
-        """Begin a chunk."""
+    def submit(self, work: Work, parameters: Floats, kept: Sequence[int], first: int) -> Future[Outcome]:
+        """Begin a chunk, whose first run has this number."""
         ...
 
     def underway(self) -> int:
@@ -53,9 +53,10 @@ class Pool(Protocol):
 class Threads(Crew):
     """Threads of this process."""
 
-    def submit(self, work: Work, parameters: Floats, kept: Sequence[int]) -> Future[Outcome]:
+    def submit(self, work: Work, parameters: Floats, kept: Sequence[int], first: int) -> Future[Outcome]:
         """Begin a chunk in a free thread."""
-        return self.begin(lambda watch: perform(work.kernel(), work.settings, work.tables, parameters, kept, watch))
+        given = (work.settings, work.tables, parameters, kept)
+        return self.begin(lambda watch: perform(work.kernel(), *given, first=first, watch=watch))
 
 
 class Cluster:
@@ -75,9 +76,9 @@ class Cluster:
             self._threads = time.monotonic(), count
         return count
 
-    def submit(self, work: Work, parameters: Floats, kept: Sequence[int]) -> Future[Outcome]:
+    def submit(self, work: Work, parameters: Floats, kept: Sequence[int], first: int) -> Future[Outcome]:
         """Send a chunk to a worker."""
-        return self._executor.submit(perform_parcel, parcel(work), parameters, list(kept))
+        return self._executor.submit(perform_parcel, parcel(work), parameters, list(kept), first)
 
     def underway(self) -> int:
         """Nothing: workers report whole chunks."""

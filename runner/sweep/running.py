@@ -77,7 +77,7 @@ def run_sweep(
     def submit(chunk: Chunk, columns: Columns, attempt: int) -> None:
         parameters, kept = plan.parameters(chunk, columns), plan.kept(chunk)
         try:
-            future = pool.submit(chunk.group.work, parameters, kept)
+            future = pool.submit(chunk.group.work, parameters, kept, chunk.first)
         except (OSError, RuntimeError) as error:  # the pool itself is gone: the chunk fails like any other
             future = Future()
             future.set_exception(error)

@@ -120,17 +120,22 @@ def perform(
     parameters: Floats,
     kept: Sequence[int] = (),
     watch: Watch | None = None,
+    first: int = 0,
 ) -> Outcome:
     """Simulate one run per row of `parameters`, in this thread; those at `kept` with their trajectory.
+
+    The number of a run, by which noise goes, is `first` for the first row, and one more for each other.
 
     A kept run is simulated twice, for a trajectory slows a whole pack down; the bits are the same. `watch` counts the
     first time and stops either.
     """
-    runs = loop.run(parameters, replace(settings, output_every=0), tables, watch=watch)
+    numbers = range(first, first + len(parameters))
+    runs = loop.run(parameters, replace(settings, output_every=0), tables, numbers=numbers, watch=watch)
     again = None if watch is None else Watch(stop=watch.stop)
     trajectories: list[Floats] = []
-    for first in range(0, len(kept), loop.width):
-        pack = loop.run(parameters[list(kept[first : first + loop.width])], settings, tables, watch=again)
+    for begin in range(0, len(kept), loop.width):
+        some = list(kept[begin : begin + loop.width])
+        pack = loop.run(parameters[some], settings, tables, numbers=[numbers[i] for i in some], watch=again)
         assert pack.trajectory is not None and pack.rows is not None
         trajectories += [rows[:count].copy() for rows, count in zip(pack.trajectory, pack.rows, strict=True)]
     return Outcome(runs, tuple(trajectories))
@@ -158,12 +163,12 @@ def parcel(work: Work) -> Parcel:
     return Parcel(Shape.of(work.system), source, source.hash, work.settings, work.tables)
 
 
-def perform_parcel(parcel: Parcel, parameters: Floats, kept: Sequence[int] = ()) -> Outcome:
+def perform_parcel(parcel: Parcel, parameters: Floats, kept: Sequence[int] = (), first: int = 0) -> Outcome:
     """`perform` in a worker: its kernel is compiled from the parcel's sources once, then taken from its cache.
 
     Raises ValueError if the sources are not those that were sent, ToolchainError if they cannot be compiled here.
     """
-    return perform(_received(parcel), parcel.settings, parcel.tables, parameters, kept)
+    return perform(_received(parcel), parcel.settings, parcel.tables, parameters, kept, first=first)
 
 
 _received_kernels: dict[str, Kernel] = {}

@@ -29,6 +29,7 @@ from springline.codegen.program import program
 from springline.model.drive import FRICTION
 from springline.model.hardware import EFFECTS, Effect
 from springline.model.mechanisms import MECHANISMS
+from springline.model.parameters import Values
 from springline.model.quantities import Q1, Quantity
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
@@ -62,7 +63,9 @@ class Offset(Effect):
 
     name = "offset"
 
-    def sense(self, y: Mapping[Quantity, ca.SX]) -> Mapping[Quantity, ca.SX]:
+    def sense(
+        self, y: Mapping[Quantity, ca.SX], p: Values, noise: Mapping[Quantity, ca.SX]
+    ) -> Mapping[Quantity, ca.SX]:
         return {**y, Q1: y[Q1] + 1e-3}
 
 

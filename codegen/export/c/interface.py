@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from springline.codegen.export import Body, Export, ScalarPrinter, port_entries
+from springline.codegen.export import Body, Export, ScalarPrinter, port_entries, remembered
 from springline.codegen.program import literal
 from springline.model.parameters import Slot
 from springline.model.quantities import A_LIMITED, DISTURBANCE, REFERENCE, SATURATED, E, Quantity, U, entries
@@ -53,6 +53,7 @@ class TypedInterface:
         names = ["measure", "control", "plant", "start", "signals"]
         shows_tip = with_tip and system.tip is not None
         names += ["tip"] if shows_tip else []
+        names += ["loop_actuate"] if system.commanded else []
         remembers = bool(system.memory)
         names += ["rates"] if remembers else []
         self._printer = ScalarPrinter(export, [system.function(name) for name in names], hoist=True)
@@ -74,6 +75,7 @@ class TypedInterface:
             "command": declared(U),
             "diagnostics": (*numbers, *declared(*limits, integer=True)),
             "state": declared(*system.drive.state),
+            **({"motors": self._motors()} if system.actuators else {}),
             "base": declared(*system.base_motion, *system.forces),
         }
         if remembers:
@@ -114,6 +116,13 @@ class TypedInterface:
             "start": self._printer.body("start", self._load({"t": ""}), [f"state->{f.name}" for f in state]),
             "signals": self._printer.body("signals", self._load({"t": ""}), signals),
         }
+        self.actuate: Body | None = None
+        """What motors are driven by at the nodes of a step, into acting[0], …, and what they remember after it."""
+        if system.commanded:
+            outputs = [f"acting[{k}]" for k in range(len(system.tableau.nodes) * system.n)]
+            outputs += [f"remembered[{k}]" for k in range(system.m.numel())]
+            load = self._load({"m": "state->", "step": ""})
+            self.actuate = self._printer.body("loop_actuate", load, outputs)
         targets = [f"tip[{k}]" for k in range(len(system.observed))]
         load = self._load(around, x_is_array=True)
         self.tip: Body | None = self._printer.body("tip", load, targets) if shows_tip else None
@@ -122,6 +131,18 @@ class TypedInterface:
         if remembers:
             targets = [f"dz[{k}]" for k in range(len(system.memory))]
             self.rates = self._printer.body("rates", self._load(seeing), targets)
+
+    def _motors(self) -> tuple[Field, ...]:
+        """What the plant's state has of its motors."""
+        meanings = {
+            "U_last": "command behind the rate limit, of the last step",
+            "a": "force of the motor behind its lag",
+        }
+        return tuple(
+            Field(f"{name}_{joint.name}", joint.force, f"{meanings[name]} ({joint.name})")
+            for name in remembered(self.export.system)
+            for joint in self.export.system.joints
+        )
 
     def _load(self, owners: dict[str, str], *, x_is_array: bool = False) -> Callable[[str, int], str]:
         """C of the inputs: members of the structures they come in."""
@@ -133,7 +154,7 @@ class TypedInterface:
                 return f"controller->derived[{k}]"
             if name == "p":
                 return f"controller->config.parameters.{symbols[k]}"
-            if (name == "x" and x_is_array) or name == "d":
+            if (name == "x" and x_is_array) or name in ("d", "noise", "arrived"):
                 return f"{name}[{k}]"
             label = ports[name][k][0]
             return owners[name] + (label.replace("u_", "U_", 1) if name == "u" else label)

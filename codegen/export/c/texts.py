@@ -34,6 +34,9 @@ def text_files(export: Export, interface: TypedInterface) -> dict[str, bytes]:
         "CMakeLists.txt": text("CMakeLists.txt"),
         f"{prefix}.pc.in": text("springline.pc.in"),
     }
+    if export.system.noise.numel():
+        runtime = resources.files("springline.codegen") / "runtime"
+        files["src/sl_noise.h"] = (runtime / "sl_noise.h").read_bytes()
     if export.tables:
         name = f"{prefix}_tables"
         runtime = resources.files("springline.codegen") / "runtime"
@@ -69,6 +72,14 @@ def _values(export: Export, interface: TypedInterface) -> dict[str, Any]:
         "memory_start": [constant(value) for value in system.z_start],
         "sliding": bool(system.sliding),
         "disturbed": bool(system.forces),
+        "actuate": interface.actuate,
+        "delay": system.structure.delay,
+        "motors": interface.structures.get("motors", ()),
+        "joints_count": system.n,
+        "sensed": bool(system.measured),
+        "noise_blocks": -(-system.noise.numel() // 4),
+        "seed": export.seed,
+        "run": export.run,
         "has_law": system.controller.law is not None,
         "command_parts": [part.name for part in system.command_parts],
         "tableau": system.tableau,
@@ -93,7 +104,8 @@ def _stepping(export: Export, interface: TypedInterface) -> dict[str, Any]:
     tableau, states = export.system.tableau, len(interface.structures["state"])
 
     def evaluate(when: int, at: str, slope: str) -> list[str]:
-        return [f"{export.prefix}_evaluate_plant(controller, motion[{when}], {at}, command, {slope});"]
+        command = f"&driven[{when}]" if export.system.commanded else "command"
+        return [f"{export.prefix}_evaluate_plant(controller, motion[{when}], {at}, {command}, {slope});"]
 
     return {
         "slopes": scalar_slopes(tableau),

@@ -65,12 +65,23 @@ def fmu(
     if part != "controller" and structure.disturbance.kind == "none":
         structure = replace(structure, disturbance=SignalShape("input"))
     system = system_of(structure)
+    if (system.measured or system.commanded) and settings.period == 0.0:
+        raise ValueError("sensors and motors go by samples: expected a period, 0 is for continuous control")
     if len(tables) != len(system.tables):
         raise ValueError(f"{len(tables)} tables given, the system has {len(system.tables)}")
     wanted = bind(structure, values, tunable=tunable).tunable
     keys = [system.slots[i].key for i in part_parameters(system, part) if i in set(wanted)]
     needed = () if part == "controller" else tables
-    export = bind(structure, values, tunable=keys, prefix=identifier, tables=needed, period=settings.sample)
+    export = bind(
+        structure,
+        values,
+        tunable=keys,
+        prefix=identifier,
+        tables=needed,
+        period=settings.sample,
+        seed=settings.seed,
+        run=settings.run,
+    )
     typed = TypedInterface(export, with_tip=part != "controller")
     shown = interface(export, typed, part, sampled=part == "controller" or settings.period > 0.0)
     code = sources(export, typed, shown, settings, version)

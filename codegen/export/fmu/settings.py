@@ -19,6 +19,7 @@ class Settings:
     bound     largest |x_i| of the plant and |z_i| of the controller, SI units
     limits    least and greatest q1 of each joint, which the plant may not pass; () for none
     until     where the scenario's signals end, s
+    seed, run  what the noise of sensors goes by
     """
 
     duration: float
@@ -27,6 +28,8 @@ class Settings:
     bound: float = 1e6
     until: float = math.inf
     limits: tuple[tuple[float, float], ...] = ()
+    seed: int = 0
+    run: int = 0
 
     @property
     def hold(self) -> int:

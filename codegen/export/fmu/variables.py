@@ -12,7 +12,7 @@ import casadi as ca
 from springline.codegen.export import Export
 from springline.codegen.export.c import Field, TypedInterface
 from springline.model.parameters import REAL, Bounds
-from springline.model.quantities import TIP, TIP_RATE, entries
+from springline.model.quantities import TIP, TIP_RATE, U, entries
 from springline.model.system import System
 
 Part = Literal["controller", "plant", "loop"]
@@ -126,7 +126,20 @@ def structures_of(typed: TypedInterface) -> dict[str, tuple[Field, ...]]:
     base = typed.structures["base"]
     motion = len(base) - len(entries(system.forces, system.joints))
     tip = tuple(Field(entry.name, entry.unit, entry.meaning) for entry in entries(system.observed, system.joints))
-    return {**typed.structures, "base": base[:motion], "disturbance": base[motion:], "tip": tip if typed.tip else ()}
+    acting = entries((U,), system.joints) if system.commanded else ()
+    shown = {entry.name: entry for entry in entries(system.measured, system.joints)}
+    places = [f"{quantity.name}_measured_{joint.name}" for quantity in system.drive.state for joint in system.joints]
+    names = dict(zip((field.name for field in typed.structures["state"]), places, strict=True))
+    seen = [names[field.name] for field in typed.structures["measurement"] if names[field.name] in shown]
+    measured = tuple(Field(name, shown[name].unit, shown[name].meaning) for name in seen)
+    return {
+        **typed.structures,
+        "base": base[:motion],
+        "disturbance": base[motion:],
+        "tip": tip if typed.tip else (),
+        "measured": measured,
+        "acting": tuple(Field(e.name, e.unit, f"force of the motor ({e.joint.name})") for e in acting if e.joint),
+    }
 
 
 def part_parameters(system: System, part: Part) -> tuple[int, ...]:
@@ -136,6 +149,7 @@ def part_parameters(system: System, part: Part) -> tuple[int, ...]:
     if part == "controller":
         return tuple(sorted(control))
     used = {*_read(system, "plant"), *_read(system, "start"), *(_read(system, "tip") if system.observed else ())}
+    used |= {*_read(system, "measure"), *(_read(system, "loop_actuate") if system.commanded else ())}
     if part == "loop":
         used |= control
     signals = {
@@ -168,6 +182,11 @@ def interface(export: Export, typed: TypedInterface, part: Part, *, sampled: boo
     given = [name for name, is_input in outside.items() if is_input and known[name]]
     shown = [name for name, is_input in outside.items() if not is_input and known[name]]
     shown += ["tip"] if known["tip"] else []
+    shown += ["measured"] if known["measured"] else []
+    shown += ["acting"] if known["acting"] and part == "loop" else []
+    if part == "loop" and export.system.commanded:
+        asked = entries(export.system.commanded, export.system.joints)
+        known["command"] = tuple(Field(entry.name, entry.unit, entry.meaning) for entry in asked)
     inputs: dict[Part, Sequence[str]] = {
         "controller": ("reference", "measurement"),
         "plant": ("command", *given),
@@ -190,7 +209,8 @@ def interface(export: Export, typed: TypedInterface, part: Part, *, sampled: boo
     for causality, structures in groups:
         for structure in structures:
             blocks[structure] = len(variables)
-            variables += [_signal(field, causality) for field in known[structure]]
+            at_samples = structure == "measured"
+            variables += [_signal(field, causality, sampled=at_samples) for field in known[structure]]
             if structure == last and "memory" in typed.structures:
                 blocks["memory"] = len(variables)
                 variables += [_signal(field, "local", sampled=sampled) for field in typed.structures["memory"]]

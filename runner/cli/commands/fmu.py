@@ -130,6 +130,8 @@ def _settings(scenario: Scenario) -> Settings:
         period=float(control["period"]) if control["mode"] == "sampled" else 0.0,
         bound=scenario.bound,
         limits=scenario.limits,
+        seed=scenario.seed,
+        run=scenario.run_number,
         until=min((table.end for table in ending), default=math.inf),
     )
 

@@ -108,6 +108,7 @@ def parameters() -> list[Row]:
     a row for each, with its name.
     """
     from springline.model.drive import EPSILON, friction_parameters
+    from springline.model.hardware import ACTUATORS, SENSORS
     from springline.model.mechanisms import MECHANISMS
     from springline.model.system import control_parameters
 
@@ -115,6 +116,8 @@ def parameters() -> list[Row]:
     for mechanism in MECHANISMS.values():
         tables = {
             "mechanism": mechanism.parameters,
+            "sensor": tuple(item for effect in SENSORS for item in effect.parameters),
+            "actuator": tuple(item for effect in ACTUATORS for item in effect.parameters),
             "drive": (*mechanism.motor_inertia, *mechanism.stiffness, *friction_parameters("elastic"), EPSILON),
             "control": control_parameters(mechanism),
         }

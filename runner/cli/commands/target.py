@@ -95,7 +95,14 @@ def tree_command(
         try:
             period = max(loaded.control_every, 1) * loaded.step
             export = bind(
-                loaded.structure(), loaded.values(), tunable=names, prefix=prefix, real=real.value, period=period
+                loaded.structure(),
+                loaded.values(),
+                tunable=names,
+                prefix=prefix,
+                real=real.value,
+                period=period,
+                seed=loaded.seed,
+                run=loaded.run_number,
             )
             files, manifest = tree(export)
         except Overflow as error:

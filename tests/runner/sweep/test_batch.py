@@ -227,7 +227,7 @@ def test_a_parcel_is_compiled_from_its_sources_and_checked(sweep: Path) -> None:
     work, parameters = chunk.group.work, plan.parameters(chunk, plan.columns(chunk))
     sent = parcel(work)
     with open_pool(1) as threads:
-        here = threads.submit(work, parameters, [3]).result()
+        here = threads.submit(work, parameters, [3], 0).result()
     there = perform_parcel(sent, parameters, [3])
     assert np.array_equal(here.runs.final_state, there.runs.final_state)
     assert np.array_equal(here.runs.metrics, there.runs.metrics, equal_nan=True)
@@ -304,7 +304,7 @@ class _Failing:
         self._sound: list[Future[Any]] = []
         self.threads = 1
 
-    def submit(self, work: Any, parameters: Any, kept: Any) -> Future[Any]:
+    def submit(self, work: Any, parameters: Any, kept: Any, first: Any) -> Future[Any]:
         chunk = float(parameters[0, 0])
         if self._failures.get(chunk, 0) > 0:
             self._failures[chunk] -= 1
@@ -312,7 +312,7 @@ class _Failing:
             future: Future[Any] = Future()
             future.set_exception(BrokenProcessPool("a worker died"))
             return future
-        self._sound.append(self._threads.submit(work, parameters, kept))
+        self._sound.append(self._threads.submit(work, parameters, kept, first))
         return self._sound[-1]
 
     def underway(self) -> int:
