@@ -52,7 +52,8 @@ class Energies:
 def energies_of(mechanism: Mechanism, q: ca.SX, dq: ca.SX, omega: ca.SX, force: ca.SX, p: Values) -> Energies:
     """The mechanism's energies, checked.
 
-    Raises ValueError for one that is no scalar of what it was given, or no quadratic form in the rates.
+    Raises ValueError for one that is no scalar of what it was given, no quadratic form in the rates, or not linear in
+    gravity (springs of the arm's own may stand beside that).
     """
     owner, known = f"mechanism {mechanism.name}", symbols_of(q, *p.values())
     given = mechanism.kinetic_energy(q, dq, omega, p)
@@ -65,4 +66,6 @@ def energies_of(mechanism: Mechanism, q: ca.SX, dq: ca.SX, omega: ca.SX, force: 
     for symbol, told in ((dq, "the joint rates"), (omega, "the base's rate")):
         if ca.depends_on(ca.simplify(mass), symbol):
             raise ValueError(f"{owner}: kinetic_energy: the mass matrix depends on {told}, expected one of q alone")
+    if ca.depends_on(ca.simplify(ca.gradient(energies.potential, force)), force):
+        raise ValueError(f"{owner}: potential_energy: it is not linear in gravity, expected it times masses and places")
     return energies

@@ -400,6 +400,8 @@ STATE = "class Bad(Controller):\n  states = (Quantity('s', 's', '1', 'state', in
         ("mechanism.name", f"{OF_ARM}return p.m * ca.SX.sym('z') * dq**2\n", "kinetic_energy: depends on 'z'"),
         ("mechanism.name", f"{OF_ARM}return p.m * dq**2 * (1 + omega[0]**2)\n", "depends on the base's rate"),
         ("mechanism.name", f"{OF_ARM}return p.m * dq**3\n", "depends on the joint rates"),
+        ("mechanism.name", f"{OF_ARM}return p.m * dq**2 / 2\n".replace("return 0", "return p.m * gravity[1]**2 * q[0]"),
+         "potential_energy: it is not linear in gravity"),
         ("mechanism.name", f"{OF_ARM}return p.m * ca.dot(dq, omega)\n", "dot: Dimension mismatch (bad.py, line 10"),
         ("mechanism.name", f"{OF_ARM}return p.m * dq[1]**2\n", "out of bounds"),
         ("mechanism.name", f"{TWO}return p.m * ca.dot(dq, dq)\n", "two numbers would be called 'U_s_a'"),
