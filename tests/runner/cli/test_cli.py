@@ -30,6 +30,7 @@ from springline.codegen.files import Changes, write_tree
 from springline.codegen.kernel import kernel
 from springline.model.control import LAWS
 from springline.model.drive import FRICTION
+from springline.model.hardware import EFFECTS
 from springline.runner.cli import app, terminal
 from springline.runner.cli.commands import run as run_command
 from springline.runner.cli.options import parse_set
@@ -932,8 +933,10 @@ def test_list_parameters_tells_all_that_the_model_declares() -> None:
     assert rows["control.K_f"]["unit"] == ["N s/m", "N m s/rad"]
     assert rows["control.delta"]["unit"] == "m or rad"
     present = {f"drive.{item.name}": 1.0 for item in FRICTION}  # what is zero is no slot
-    slots = load_scenario("paper/nominal", present).system().slots
-    numbered = {slot.key for slot in slots if slot.key.partition(".")[0] in {"mechanism", "drive", "control"}}
+    present |= {f"{effect.table}.{item.name}": 1.0 for effect in EFFECTS.values() for item in effect.parameters}
+    slots = load_scenario("paper/nominal", {**present, "control.mode": "sampled", "control.period": 1e-3}).system().slots
+    tables = {"mechanism", "drive", "control", "sensor", "actuator"}
+    numbered = {slot.key for slot in slots if slot.key.partition(".")[0] in tables}
     assert {re.sub(r"\.\d$", "", key) for key in numbered} == set(rows)
 
 
