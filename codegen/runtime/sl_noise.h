@@ -2,13 +2,13 @@
  * sl_noise.h - random numbers that are no state: they follow from what is counted, wherever and in
  * whatever order they are made.
  *
- * Words are those of Philox4x32-10: J. K. Salmon, M. A. Moraes, R. O. Dror and D. E. Shaw, "Parallel
- * random numbers: as easy as 1, 2, 3", SC'11 (2011), doi 10.1145/2063384.2063405. Normal numbers are
- * made of them by Box and Muller's method (Ann. Math. Statist. 29 (1958), 610), with our own
- * elementary functions: the same bits everywhere.
+ * Words are those of Philox4x32-10: J. K. Salmon, M. A. Moraes, R. O. Dror and D. E. Shaw,
+ * "Parallel random numbers: as easy as 1, 2, 3", SC'11 (2011), doi 10.1145/2063384.2063405. Normal
+ * numbers are made of them by Box and Muller's method (Ann. Math. Statist. 29 (1958), 610), with
+ * our own elementary functions: the same bits everywhere.
  *
- * It makes them for SL_W runs at once behind sl_lanes.h, for one in double behind sl_math.h, and for
- * one in float behind sl_mathf.h where SL_NOISE_SINGLE is defined. One file may have both.
+ * It makes them for SL_W runs at once behind sl_lanes.h, for one in double behind sl_math.h, and
+ * for one in float behind sl_mathf.h where SL_NOISE_SINGLE is defined. One file may have both.
  */
 #if defined(SL_LANES_H)
 #define SL_NOISE(name) slv_##name

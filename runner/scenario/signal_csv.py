@@ -120,6 +120,8 @@ def read_samples(data: bytes, file: str, columns: Sequence[Column], where: str, 
         if not lines and _names_units(block[0][1]):
             notes = _unit_notes([block[0][1][i] for i in wanted], file, columns, where)
             del block[0]
+            if not block:
+                continue
         numbers = np.empty((len(block), len(columns)))
         for i, (column, cells) in enumerate(zip(columns, zip(*map(chosen, block), strict=True), strict=True)):
             text = "\n".join(cells)

@@ -24,7 +24,8 @@ _LARGE = 10e9
 _SHOWN_KEYS = 5
 _BEAT = 10.0
 _FLAWS = 20  # parts that are named when they are not whole
-_PACKAGED = "gains, laws, payload_and_phase, stability_map"  # here, for the help must not load all that lists them
+# Here, for the help must not load all that lists them.
+_PACKAGED = "controllers, gains, laws, payload_and_phase, stability_map"
 
 
 def batch(

@@ -934,7 +934,9 @@ def test_list_parameters_tells_all_that_the_model_declares() -> None:
     assert rows["control.delta"]["unit"] == "m or rad"
     present = {f"drive.{item.name}": 1.0 for item in FRICTION}  # what is zero is no slot
     present |= {f"{effect.table}.{item.name}": 1.0 for effect in EFFECTS.values() for item in effect.parameters}
-    slots = load_scenario("paper/nominal", {**present, "control.mode": "sampled", "control.period": 1e-3}).system().slots
+    slots = (
+        load_scenario("paper/nominal", {**present, "control.mode": "sampled", "control.period": 1e-3}).system().slots
+    )
     tables = {"mechanism", "drive", "control", "sensor", "actuator"}
     numbered = {slot.key for slot in slots if slot.key.partition(".")[0] in tables}
     assert {re.sub(r"\.\d$", "", key) for key in numbered} == set(rows)
