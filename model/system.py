@@ -113,12 +113,19 @@ def control_parameters(mechanism: Mechanism, drive: DriveKind = "elastic") -> tu
 
 
 def own_control_tables(structure: Structure) -> dict[str, tuple[Parameter, ...]]:
-    """Tables [control.<name>] of a structure: of its controller, its observer, and a law that is a user's own."""
+    """Tables [control.<name>] of a structure: of its controller, its observer, and a law that is a user's own.
+
+    Raises ValueError for two of one name, which would share a table.
+    """
     mechanism = MECHANISMS[structure.mechanism].of_size(structure.size)
     controller = CONTROLLERS[structure.controller]
     law = LAWS[structure.law]
     owners: list[Controller | Law | Observer] = [controller, OBSERVERS[structure.observer]]
     owners += [] if LAWS.is_packaged(structure.law) else [law]
+    names = [item.name for item in owners]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"two of controller, observer and law are called {name!r}: give one another name")
     return {
         item.name: tuple(mechanism.fitted(parameter, item.name) for parameter in item.parameters)
         for item in owners

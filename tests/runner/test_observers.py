@@ -168,3 +168,18 @@ def test_an_observer_that_cannot_be_is_told_with_its_file(disturbance: str, mess
     assert message in str(error.value)
     assert "slow.py" in str(error.value)
     assert "control.observer" in str(error.value)
+
+
+def test_a_controller_and_an_observer_of_one_name_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(
+        "from springline.model import Control, Controller, Observer, Parameter\n"
+        "class Mine(Controller):\n"
+        "  name, parameters = 'mine', (Parameter('k', '1', 1.0, 'gain'),)\n"
+        "  def control(self, r, y, z, model, p): return Control(p.k * (r.q - y.q1), r.q - y.q1)\n"
+        "class Other(Observer):\n"
+        "  name, parameters = 'mine', (Parameter('k', '1', 1.0, 'gain'),)\n"
+        "  def estimate(self, y, u, z, model, p): return 0 * y.q1, {}\n"
+    )
+    (tmp_path / "s.toml").write_text("[control]\ncontroller = 'own.py:Mine'\nobserver = 'own.py:Other'\n")
+    with pytest.raises(InputError, match="two of controller, observer and law are called 'mine'"):
+        load_scenario(tmp_path / "s.toml")
