@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from springline.codegen.elementary import float_header
 from springline.codegen.export import bind
 from springline.codegen.export.c import generate_files
 from springline.codegen.export.fmu import Settings, fmu
@@ -100,7 +101,7 @@ def generator(lanes: int = 1, real: str = "double") -> ctypes.CDLL:
     )
     sources = {**runtime_sources(), "draws.c": text}
     if real == "float":
-        sources["sl_mathf.h"] = (Path(fmu_module.__file__).parents[2] / "runtime" / "sl_mathf.h").read_text()
+        sources["sl_mathf.h"] = float_header()
     flags = ("-O2", "-std=gnu99", "-ffp-contract=off", f"-DSL_W={lanes}", "-lm")
     return toolchain.load(toolchain.build_library(sources, main="draws.c", flags=flags))
 
