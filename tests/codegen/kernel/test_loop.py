@@ -612,7 +612,9 @@ def test_a_metric_that_only_one_side_knows_is_an_error(shaken: Program, monkeypa
 
 def test_a_job_of_another_size_is_an_error(shaken: Program, monkeypatch: pytest.MonkeyPatch) -> None:
     sources = dict(kernel_source.runtime_sources())
-    sources["simulate.h"] = sources["simulate.h"].replace("  int64_t capacity;", "  int64_t seed;\n  int64_t capacity;")
+    sources["simulate.h"] = sources["simulate.h"].replace(
+        "  int64_t capacity;", "  int64_t another;\n  int64_t capacity;"
+    )
     size = ctypes.sizeof(Job)
     monkeypatch.setattr(kernel_source, "runtime_sources", lambda: sources)
     with pytest.raises(LayoutError, match=f"bytes of a job: {size + 8}, expected {size}"):
