@@ -188,7 +188,8 @@ def test_pinocchio(pin, arm):
         close(bias, needed, np.abs(needed).max(), "C dq + G - S")
 
 
-def test_mujoco(mujoco, arm):
+def test_mujoco(mujoco, arm, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo keeps a log
     structure, numbers, links, g = arm
     model, terms, n, six = mujoco_model(mujoco, links, g), ours(structure, numbers), len(links), len(CHAIN)
     data = mujoco.MjData(model)
