@@ -25,12 +25,14 @@ static inline double per_ulp(double exact) {
   return sl_real((UINT64_C(2069) << 52) - (sl_bits(size) & SL_EXPONENT));
 }
 
-/* Zeros count by their sign, and what overflows must be infinite. */
+/* Zeros count by their sign, infinity as the float behind the largest. */
 static double error_of(float got, double exact) {
   if (got != got || exact != exact) return (got != got && exact != exact) ? 0.0 : SL_INF;
   if ((slf_bits(got) >> 31) != (sl_bits(exact) >> 63)) return SL_INF;
-  if (got - got != 0.0f || sl_fabs(exact) >= 0x1.ffffffp127) return got == (float)exact ? 0.0 : SL_INF;
-  return sl_fabs(got - exact) * per_ulp(exact);
+  {
+    const double size = got - got != 0.0f ? 0x1p128 : sl_fabs(got), wanted = sl_fmin(sl_fabs(exact), 0x1p128);
+    return sl_fabs(size - wanted) * per_ulp(sl_fmin(wanted, 0x1.fffffep127));
+  }
 }
 
 #ifndef PAIRS
