@@ -44,7 +44,8 @@ class TerminalSliding(Controller):
             error, rate_error = tracking_error(r, y)
             sigma, surface_rate = surface(error, rate_error, p, self.exponents)
             named("sigma", sigma), named("dsurface", surface_rate)
-        with section(f"reaching law: {self.reaching.title}", f"{self.reaching.equations}, limit E4"):
+        written = ", ".join(filter(None, (self.reaching.equations, "limit E4")))
+        with section(f"reaching law: {self.reaching.title}", written):
             rate, a_law = reaching_rate(self.reaching, sigma, p)
         with section("slow control: computed torque", "(14), (25)"):
             u_e = named("u_e", rate - surface_rate)

@@ -275,3 +275,15 @@ def test_what_goes_over_several_lines_is_aligned_for_every_prefix(prefix: str) -
         text = files[name].decode()
         assert f"{prefix}_" in text
         assert not re.findall(r"^ {10,}(?:const |\w+ \*)\w.*$", text, re.MULTILINE), name
+
+
+def test_a_law_that_cites_nothing_leaves_no_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Plain(Law):
+        def rate(self, sigma: ca.SX, p: Values) -> ca.SX:
+            return -p.k1 * sigma
+
+    monkeypatch.setitem(LAWS, "plain", Plain())
+    structure = Structure(law="plain")
+    values = np.array([slot.default for slot in System(structure).slots])
+    text = b"".join(model_files(bind(structure, values)).values()).decode()
+    assert "/* reaching law: plain, limit E4 */" in text
