@@ -65,7 +65,7 @@ def packages_of(interpreter: Path) -> Iterator[None]:
     finally:
         sys.path = path
         taken()
-        sys.modules.update(before)  # type: ignore[arg-type]
+        sys.modules.update(before)  # type: ignore[arg-type] # modules, put back as they were found
 
 
 class Clock:

@@ -63,7 +63,7 @@ def _remembering() -> Any:
     """A controller with two states a joint."""
     control, quantities = _module("model.control"), _module("model.quantities")
 
-    class Remembering(control.Controller):  # type: ignore[misc,name-defined]
+    class Remembering(control.Controller):  # type: ignore[misc,name-defined] # a checkout's own
         """PD about the reference with the integrals of the error and of that."""
 
         states = (
