@@ -57,15 +57,22 @@ class Measured:
         length = float(self["t"][-1] - self["t"][rows][0])
         return float(np.sum(np.abs(np.diff(self[column][rows])))) / length
 
+    def above(self, column: str, frequency: float) -> Floats:
+        """What a column holds above a frequency (Hz), in its unit, row by row.
+
+        A Butterworth high-pass of fourth order, run forwards and backwards.
+        """
+        step = float(self["t"][1] - self["t"][0])
+        sections = signal.butter(4, frequency, "highpass", fs=1 / step, output="sos")
+        filtered: Floats = signal.sosfiltfilt(sections, self[column])
+        return filtered
+
     def ripple(self, column: str, above: float, since: float = 0.5) -> float:
         """RMS of what a column holds above a frequency (Hz) from the share `since` of the run on, in its unit.
 
-        A Butterworth high-pass of fourth order, run forwards and backwards. The last twentieth is left out, for there
-        the filter knows no future.
+        The last twentieth is left out, for there the filter knows no future.
         """
-        step = float(self["t"][1] - self["t"][0])
-        sections = signal.butter(4, above, "highpass", fs=1 / step, output="sos")
-        filtered = signal.sosfiltfilt(sections, self[column])
+        filtered = self.above(column, above)
         rows = len(filtered)
         return float(np.sqrt(np.mean(filtered[int(since * rows) : int(0.95 * rows)] ** 2)))
 

@@ -21,7 +21,8 @@ from springline.runner.paper.cases import GROUPS
 from springline.runner.paper.claims import CLAIMS
 from springline.runner.paper.evidence import Finding, judge
 from springline.runner.paper.figures import FIGURES, OPEN_FIGURES
-from springline.runner.paper.report import compose, plain, table_4
+from springline.runner.paper.numbers import plain
+from springline.runner.paper.report import compose, table_4
 from springline.runner.paper.runs import study
 from springline.runner.report import figure_files, to_html, to_markdown
 from springline.runner.run import Progress

@@ -21,7 +21,7 @@ from springline.model.structure import Structure
 from springline.model.system import System
 from springline.runner.files import InputError, Problem
 from springline.runner.paper.cases import LAWS, cases
-from springline.runner.paper.evidence import Evidence, Theory
+from springline.runner.paper.evidence import Evidence, Inherent, Theory
 from springline.runner.paper.measured import Floats, Measured
 from springline.runner.run import Crew, Progress, Result, results, simulate, trajectory_table
 from springline.runner.scenario import Scenario, load_scenario
@@ -80,6 +80,33 @@ LIMITS: Mapping[str, Experiment] = {
 }
 """Limit on the reaching law, base at rest."""
 
+SAMPLING: Mapping[str, Experiment] = {
+    f"{law} {period:g}": Experiment(
+        f"{name}, sampled at {1e3 * period:g} ms",
+        f"paper/group2_{law}",
+        {"control.mode": "sampled", "control.period": period},
+    )
+    for period in (1.9e-3, 2.0e-3, 2.1e-3)
+    for law, name in LAWS.items()
+}
+"""The three laws under shake with sampled control (E11). Periods are multiples of the scenarios' step and its half."""
+
+SOLVER: Mapping[str, Experiment] = {
+    "fine": Experiment("a_max = 50, step 0.1 ms", "paper/group4_fast_off", {"control.a_max": 50.0}),
+    "coarse": Experiment(
+        "a_max = 50, step 1 ms", "paper/group4_fast_off", {"control.a_max": 50.0, "simulation.step": 1e-3}
+    ),
+    "motors": Experiment(
+        "motors limited to 2000 N and 5000 N m instead of the law, step 0.1 ms",
+        "paper/group4_fast_off",
+        {"control.a_max": float("inf"), "control.U_max": [2000.0, 5000.0]},
+    ),
+}
+"""Without fast control: what decides how long a run lasts (E11). RK4 damps the springs at a step of a millisecond."""
+
+_TABLES = (LITERAL, READINGS, LAYERS, LIMITS, SAMPLING, SOLVER)
+"""In the order of Study's fields."""
+
 Key = tuple[Any, ...]
 """What a run is for: ("case", scenario name, whether the step is halved), or an experiment's likewise."""
 
@@ -96,7 +123,7 @@ class Study:
     whole      whether the rest was run too: Figures 4 to 7 and the sections on what the paper leaves open
     scenarios  scenario name -> scenario of each case
     evidence, halved  what the claims look at, with the scenarios' step and with half of it
-    literal, readings, layers, limits  the experiments of these names; empty unless `whole`
+    literal, readings, layers, limits, sampling, solver  the experiments of these names; empty unless `whole`
     """
 
     groups: tuple[int, ...]
@@ -109,6 +136,8 @@ class Study:
     readings: Mapping[str, Twice]
     layers: Mapping[str, Twice]
     limits: Mapping[str, Twice]
+    sampling: Mapping[str, Twice]
+    solver: Mapping[str, Twice]
 
 
 def study(
@@ -123,7 +152,7 @@ def study(
     """
     changed = dict(changes or {})
     names = [case.scenario for case in cases(groups)]
-    tables = (LITERAL, READINGS, LAYERS, LIMITS) if whole else ()
+    tables = _TABLES if whole else ()
     wanted: dict[Key, tuple[str, Overrides]] = {("case", name): (name, {}) for name in names}
     wanted |= {
         (number, key): (experiment.scenario, experiment.overrides)
@@ -146,6 +175,8 @@ def study(
     )
     runs = _run_all({**scenarios, **{("linear", *key): scenario for key, scenario in linear.items()}}, progress)
 
+    mechanical = {key: value for key, value in changed.items() if not key.startswith("base_motion")}
+
     def evidence(half: bool) -> Evidence:
         measured = {name: runs["case", name, half] for name in names}
         return Evidence(
@@ -155,9 +186,8 @@ def study(
                 for name, run in measured.items()
                 if run.status == "ok"
             },
-            laws={law: reaching_law(load_scenario("paper/nominal", {**changed, "control.law": law})) for law in LAWS}
-            if whole
-            else {},
+            laws={law: reaching_law(load_scenario("paper/nominal", {**changed, "control.law": law})) for law in LAWS},
+            inherent=inherent_of(load_scenario("paper/group1_shake", mechanical)),
             linear={law: runs["linear", law, half] for law in LAWS} if whole else {},
         )
 
@@ -171,7 +201,7 @@ def study(
         {name: scenarios["case", name, False] for name in names},
         evidence(False),
         evidence(True),
-        *(experiments(number, table) for number, table in enumerate((LITERAL, READINGS, LAYERS, LIMITS))),
+        *(experiments(number, table) for number, table in enumerate(_TABLES)),
     )
 
 
@@ -192,7 +222,13 @@ def _run_all(scenarios: Mapping[Key, Scenario], progress: Progress | None) -> di
     for key, scenario in scenarios.items():
         structure = _linear_structure(scenario) if key[0] == "linear" else scenario.structure()
         program(structure)  # derived here, so that threads do not wait for each other
-        same = (scenario.values().tobytes(), scenario.step, scenario.steps, scenario.output_every)
+        same = (
+            scenario.values().tobytes(),
+            scenario.step,
+            scenario.steps,
+            scenario.output_every,
+            scenario.control_every,
+        )
         jobs.setdefault(structure, {}).setdefault(same, []).append(key)
     total = sum(len(runs) for runs in jobs.values())
     done: dict[Key, Measured] = {}
@@ -255,6 +291,31 @@ def reaching_law(scenario: Scenario) -> Callable[[Floats], Floats]:
         return asked
 
     return rate
+
+
+def inherent_of(scenario: Scenario) -> Inherent:
+    """What mechanism and surface of a scenario whose base heaves say by themselves (E5, E10)."""
+    system, values = scenario.system(), scenario.values()
+    angles = np.linspace(-np.pi, np.pi, 721)
+    still = np.zeros(len(system.base.coordinates))
+    heave = (np.array([item.key for item in system.base.coordinates]) == "heave").astype(float)
+    q = np.array([np.zeros_like(angles), angles])
+    force = system.function("base_disturbance")(still, still, heave, q, np.zeros_like(q), values).full()
+    mass = system.function("slow_mass")(q, values).full()
+    felt = theory.felt_acceleration(mass.reshape(system.n, -1, system.n).swapaxes(0, 1), force)
+    printed = values.copy()
+    printed[[slot.key for slot in system.slots].index("control.delta")] = 0.0
+
+    def at_rest(joint: str, errors: Floats, p: Floats) -> Floats:
+        i = [item.name for item in system.joints].index(joint)
+        x = np.zeros((system.x.numel(), len(errors)))
+        x[i] = -errors
+        zero = np.zeros((system.n, 1))
+        _, _, sigma = system.function("slow_control")(zero, zero, zero, x, p)
+        size: Floats = np.abs(sigma.full()[i])
+        return size
+
+    return Inherent(angles, felt, partial(at_rest, p=values), partial(at_rest, p=printed))
 
 
 def theory_of(scenario: Scenario, run: Measured) -> Theory:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from springline.codegen.files import render
@@ -44,13 +44,27 @@ class Bullets:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Cells as text, row by row, as long as `columns`; the first `labels` columns are words, the others numbers."""
+    """Cells as text, row by row, as long as `columns`; the first `labels` columns are words, the others numbers.
+
+    words   places of further columns of words
+    shades  (row, column) -> class of the page's style by which a cell is shaded
+    """
 
     kind: ClassVar[str] = "table"
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     caption: str = ""
     labels: int = 1
+    words: Sequence[int] = ()
+    shades: Mapping[tuple[int, int], str] = field(default_factory=dict)
+
+    def is_number(self, column: int) -> bool:
+        """Whether a column is set as numbers are."""
+        return column >= self.labels and column not in self.words
+
+    def classes(self, row: int, column: int) -> str:
+        """The classes of a cell in the page's style."""
+        return " ".join(filter(None, ("number" if self.is_number(column) else "", self.shades.get((row, column), ""))))
 
 
 @dataclass(frozen=True, slots=True)

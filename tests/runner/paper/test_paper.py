@@ -24,12 +24,23 @@ import pytest
 from springline.codegen.files import FolderConflict
 from springline.runner.files import InputError
 from springline.runner.paper import GROUPS, reproduce, reproduction
+from springline.runner.paper.captions import SEEN
 from springline.runner.paper.cases import CASES, JOINTS, MEASURES, cases
 from springline.runner.paper.figures import FIGURES, OPEN_FIGURES
-from springline.runner.paper.measured import Measured
-from springline.runner.paper.report import change, number, plain
+from springline.runner.paper.measured import Measured, first_time
+from springline.runner.paper.numbers import change, number, plain
 from springline.runner.paper.reproduction import Reproduction
-from springline.runner.paper.runs import E8_SHAKE, measure, reaching_law, theory_of, with_velocities
+from springline.runner.paper.runs import (
+    E8_SHAKE,
+    SAMPLING,
+    SOLVER,
+    Experiment,
+    inherent_of,
+    measure,
+    reaching_law,
+    theory_of,
+    with_velocities,
+)
 from springline.runner.run import simulate
 from springline.runner.scenario import load_scenario, packaged_scenarios
 
@@ -160,14 +171,50 @@ def test_accelerations_that_the_laws_ask_for_at_the_start() -> None:
     assert abs(double(np.array([-7.64]))[0]) == pytest.approx(1.3e5, rel=0.01)
 
 
-def test_disturbances_that_the_printed_errors_would_take() -> None:
-    """The reasons of claim 4: sigma at rest with the printed errors, and what the laws ask for there."""
-    for law, error, disturbance in (("double_power", 0.18, 1000.0), ("power", 0.16, 5.0)):
-        scenario = load_scenario("paper/nominal", {"control.law": law, "control.delta": 0.0})
-        x = np.array([-error, 0.0, 0.0, 0.0, -error, 0.0, 0.0, 0.0])
-        rest = np.zeros(2)
-        _, _, sigma = scenario.system().function("slow_control")(rest, rest, rest, x, scenario.values())
-        assert abs(reaching_law(scenario)(np.array([float(sigma[0])]))[0]) == pytest.approx(disturbance, rel=0.02)
+def test_what_the_printed_errors_would_take() -> None:
+    """E10: with Table 3's gains, heaves of 5 and 42 m/s^2 (power law) and of 1000 and 86 m/s^2 (double power)."""
+    scenario = load_scenario("paper/group1_shake")
+    inherent = inherent_of(scenario)
+    for law, joint, error, heave in (
+        ("power", "lift", 0.16, 5.0),
+        ("power", "rotation", 0.06, 42.0),
+        ("double_power", "lift", 0.18, 1000.0),
+    ):
+        rate = reaching_law(load_scenario("paper/nominal", {"control.law": law}))
+        asked = abs(rate(inherent.at_rest(joint, np.array([error])))[0])
+        assert asked / inherent.largest(joint) == pytest.approx(heave, rel=0.07)
+
+
+def test_what_the_mechanism_says_of_heave() -> None:
+    """E10: H^-1 S per m/s^2 of heave; E5: the surface alone needs 0.16 s to 10 % on the lift."""
+    inherent = inherent_of(load_scenario("paper/group1_shake"))
+    for angle, felt in ((0.0, (-0.909, -0.092)), (1.0, (-0.954, -0.025)), (1.5, (-0.961, -0.003))):
+        found = [np.interp(angle, inherent.angles, joint) for joint in inherent.felt]
+        assert found == pytest.approx(felt, abs=6e-4)
+    assert inherent.surface_time("lift", 0.8, 0.08) == pytest.approx(0.16, abs=0.005)
+
+
+def test_experiments_on_sampling_and_on_the_step_are_runs_of_their_own() -> None:
+    """E11: at 2 ms the double power law chatters and the power law diverges at 0.17 s; at 1 ms RK4 lasts to 3.38 s."""
+    for key, status, end in (
+        ("variable_power_log 0.002", "ok", 4.0),
+        ("power 0.002", "out_of_bounds", 0.17),
+        ("power 0.0019", "ok", 4.0),
+    ):
+        experiment = SAMPLING[key]
+        run = seen_of(experiment)
+        assert run.status == status
+        assert run.end == pytest.approx(end, abs=0.01)
+    assert seen_of(SOLVER["coarse"]).end == pytest.approx(3.38, abs=0.01)
+    motors = seen_of(SOLVER["motors"])
+    late = motors["t"] > 0.5
+    assert first_time(motors["t"][late], np.abs(motors["e_lift"][late]) > 0.5) == pytest.approx(1.31, abs=0.01)
+    assert motors.end == pytest.approx(3.47, abs=0.01)
+
+
+def seen_of(experiment: Experiment) -> Measured:
+    scenario = load_scenario(experiment.scenario, dict(experiment.overrides))
+    return measure(scenario, simulate(scenario))
 
 
 # Theory
@@ -221,6 +268,7 @@ def test_every_figure_of_the_paper_is_there_once() -> None:
     for figure in FIGURES:
         assert figure.caption.startswith(f"**Figure {int(figure.name[-2:])}.**")
     assert len({figure.name for figure in (*FIGURES, *OPEN_FIGURES)}) == len(FIGURES) + len(OPEN_FIGURES)
+    assert set(SEEN) == {figure.name for figure in (*FIGURES, *OPEN_FIGURES)}
     assert [f.group for f in FIGURES if f.group] == [1] * 5 + [2] * 4 + [3] * 6 + [4] * 4
 
 
@@ -432,6 +480,16 @@ def test_the_markdown_report_shows_files_that_are_there(done: Reproduction) -> N
 )
 def test_numbers_are_written_for_people(value: float | None, text: str) -> None:
     assert number(value) == text
+
+
+def test_the_base_motion_of_a_group_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shake was once reported as none, when its coordinate was given another name."""
+    monkeypatch.setattr(reproduction, "figure_files", lambda name, _: {f"{name}.svg": b"<svg/>", f"{name}.png": b""})
+    reproduce(tmp_path / "out", [1], overrides={"simulation.duration": 0.5})
+    text = (tmp_path / "out/report.md").read_text(encoding="utf-8")
+    assert "shake of group 1): shake 1.5 sin(1.5 t) + 0.03 sin(10 t) m" in text
+    assert "roll of group 1): roll 0.2618 sin(0.7 t) rad" in text
+    assert "accelerates the base by 3.2 m/s² (RMS), of which its terms have 2.4 and 2.1" in text  # E14
 
 
 def test_changes_have_a_sign_and_rounding_is_none() -> None:
