@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from springline.runner.paper.cases import CASES, FLUTTER_SEEN, GRADIENTS, JOINTS, LAWS, UNIT
 from springline.runner.paper.evidence import Check, Claim, Evidence, Judgement, Number
 from springline.runner.paper.measured import Floats, first_time, lasting_time
+from springline.runner.paper.numbers import number, percent
 
 CHATTER_ABOVE = 10.0
 """Hz. Reference and base oscillations stay below 2 Hz; what moves faster than this is chatter."""
@@ -151,7 +152,7 @@ def _steady_state(evidence: Evidence) -> Judgement:
             Check(
                 f"{LAWS[law]}: significant, more than 10 % of the initial error",
                 errors[law] > 0.1 * initial,
-                f"{errors[law] / initial:.1%} of it; with Table 3's gains and motors without limit the printed "
+                f"{percent(errors[law] / initial)} of it; with Table 3's gains and motors without limit the printed "
                 f"{printed[law][0]:g} m takes a heave of {takes[law][0]:.3g} m/s² that lasts",
             ),
             Check(
@@ -194,7 +195,7 @@ def _chatter(evidence: Evidence) -> Judgement:
                 Check(
                     f"{name} per second, {joint}: least with the new law",
                     least,
-                    f"the three differ by {spread:.1%}: U has to carry reference and shake, which make up nearly "
+                    f"the three differ by {percent(spread)}: U has to carry reference and shake, which make up nearly "
                     "all of "
                     "its variation, and the law that follows them best uses most of it"
                     if column[0] == "U"
@@ -216,10 +217,10 @@ def _chatter(evidence: Evidence) -> Judgement:
         share = min(ripple[law] for law in traditional) / scale
         checks.append(
             Check(
-                f"the traditional laws chatter visibly, {joint}: more than {VISIBLE:.0%} of the largest wished "
+                f"the traditional laws chatter visibly, {joint}: more than {percent(VISIBLE)} of the largest wished "
                 "velocity",
                 share > VISIBLE,
-                f"{share:.2%} only; control that is computed at every step has no cause to chatter but the laws' "
+                f"{percent(share)} only; control that is computed at every step has no cause to chatter but the laws' "
                 "infinite slope at σ = 0",
             )
         )
@@ -441,10 +442,10 @@ def _group_1_chatter(evidence: Evidence) -> Judgement:
             )
             checks.append(
                 Check(
-                    f"{case.name}: the velocity chatters visibly, {joint}: more than {VISIBLE:.0%} of the largest "
+                    f"{case.name}: the velocity chatters visibly, {joint}: more than {percent(VISIBLE)} of the largest "
                     "wished velocity",
                     share > VISIBLE,
-                    f"{share:.1e} of it",
+                    f"{number(share, 2)} of it",
                 )
             )
     note = (

@@ -35,3 +35,8 @@ def change(difference: float | None, of: float) -> str:
         return "0"
     text = number(difference, 2)
     return f"+{text}" if difference is not None and difference > 0 else text
+
+
+def percent(share: float) -> str:
+    """A share for people, to two digits."""
+    return f"{number(100 * share, 2)} %"
