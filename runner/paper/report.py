@@ -125,9 +125,7 @@ _SHADES = dict(zip(BANDS, ("close", "near", "factor"), strict=True))
 
 def _table_4(study: Study, step: float) -> list[Block]:
     chosen = cases(study.groups)
-    bands = ", ".join(
-        f"{'dark green' if k == 0 else 'light green' if k == 1 else 'yellow'} {band}" for k, band in enumerate(BANDS)
-    )
+    bands = ", ".join(f"{colour} {band}" for colour, band in zip(("green", "pale green", "yellow"), BANDS, strict=True))
     blocks: list[Block] = [
         Heading("Table 4"),
         _prose(f"""Response time: first time at 10 % of the initial error. Settling time: last time above 5 % of it.
@@ -137,7 +135,7 @@ def _table_4(study: Study, step: float) -> list[Block]:
     ]
     for title, names in (("Times [s]", TIMES), ("Errors [m, rad]", ERRORS)):
         columns = ["group", "case"]
-        columns += [f"{MEASURES[name]}, {joint}: {whose}" for name in names for joint in JOINTS for whose in _WHOSE]
+        columns += [f"{_SHORT_NAMES[name]}, {joint}: {whose}" for name in names for joint in JOINTS for whose in _WHOSE]
         rows: list[list[str]] = []
         shades: dict[tuple[int, int], str] = {}
         for case in chosen:
@@ -170,6 +168,14 @@ def _table_4(study: Study, step: float) -> list[Block]:
 
 
 _WHOSE = ("paper", "ours")
+
+_SHORT_NAMES: Mapping[str, str] = {
+    "response_time": "response",
+    "settling_time": "settling",
+    "overshoot": "overshoot",
+    "steady_state_error": "steady state",
+}
+"""Measure -> heading of a column that has its joint beside it."""
 
 
 def _anywhere(run: Measured, finer: Measured) -> str:

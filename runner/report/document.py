@@ -13,6 +13,9 @@ from typing import ClassVar
 
 from springline.codegen.files import render
 
+_SHORT = 24
+"""Letters of a cell up to which its column's lines are not broken."""
+
 _MARK = re.compile(r"(`[^`]+`|\*\*[^*]+\*\*|\[\[[^\]]+\]\])")
 
 
@@ -63,8 +66,14 @@ class Table:
         return column >= self.labels and column not in self.words
 
     def classes(self, row: int, column: int) -> str:
-        """The classes of a cell in the page's style."""
-        return " ".join(filter(None, ("number" if self.is_number(column) else "", self.shades.get((row, column), ""))))
+        """The classes of a cell in the page's style: number, short (where no cell of its column is long), its shade."""
+        short = all(len(cells[column]) <= _SHORT for cells in self.rows)
+        found = (
+            "number" if self.is_number(column) else "",
+            "short" if short else "",
+            self.shades.get((row, column), ""),
+        )
+        return " ".join(filter(None, found))
 
 
 @dataclass(frozen=True, slots=True)
