@@ -1,4 +1,4 @@
-"""Chatter that an ulp changes, and its hash: the same by every engine, width, compiler and machine (docs/equal-bits.md)."""
+"""Chatter that an ulp changes, and its hash: that of every engine, width, compiler and machine (docs/equal-bits.md)."""
 
 from __future__ import annotations
 
@@ -83,8 +83,8 @@ def test_the_plant_is_a_mass_that_control_and_disturbance_push() -> None:
     plant = scenario.system().function("plant")
     rng = np.random.default_rng(3)
     for q, dq, u, d in rng.normal(scale=10.0, size=(50, 4)):
-        rates = plant(0.0, 0.0, 0.0, d, [q, dq], u, scenario.values())
-        np.testing.assert_array_equal(np.ravel(rates), [dq, u + d])
+        rates = np.array(plant(0.0, 0.0, 0.0, d, [q, dq], u, scenario.values())).ravel()
+        np.testing.assert_array_equal(rates, [dq, u + d])
 
 
 def test_an_ulp_at_the_start_is_soon_as_large_as_the_chatter() -> None:
@@ -92,7 +92,7 @@ def test_an_ulp_at_the_start_is_soon_as_large_as_the_chatter() -> None:
     other = scenario.with_overrides({"initial.q": float(np.nextafter(0.5, 1.0))})
     apart = np.abs(command(scenario) - command(other))
     assert apart[0] < 1e-12
-    assert apart[len(apart) // 2 :].max() > 1.0  # N m
+    assert apart[len(apart) // 2 :].max() > 10.0  # N m
 
 
 # Here
@@ -121,13 +121,13 @@ def test_every_sample_has_the_promised_bits() -> None:
         ("gcc", "-O0", {"width": 1}),
         ("gcc", "-O3", {"width": 2}),
         ("clang", "-O0", {"width": 4}),
-        ("clang", "-O1", {"width": 8}),
-        ("gcc", "-O2", {"width": 16}),
-        ("clang", "-O3", {"width": 16}),
+        ("gcc", "-O1", {"width": 8}),
+        ("clang", "-O3", {"width": 8}),
+        ("clang", "-O2", {"width": 16}),
     ],
 )
 def test_builds_give_the_promised_bits(compiler: str, level: str, options: Any, require_tool: Tool) -> None:
-    built = build(require_tool, compiler, flags=(level,), **options)
+    built = build(require_tool, compiler, flags=(level,), groups=1, packs=1, **options)
     assert hash_of(chatter(SHORT), built) == BEGINNING
 
 
@@ -179,25 +179,25 @@ def ready(target: str, require_tool: Tool) -> None:
 def test_exported_c_gives_the_promised_bits(
     compiler: str, level: str, export: Path, tmp_path: Path, require_tool: Tool
 ) -> None:
-    samples, wanted = (SHORT, BEGINNING) if level == "-O0" else (1_000_000, WHOLE)
+    samples, wanted = (1_000_000, WHOLE) if level == "-O3" else (SHORT, BEGINNING)
     settings = (f"CC={require_tool(compiler)}", f"LEVEL={level}", f"SAMPLES={samples}")
     assert made("host", export, tmp_path, *settings) == wanted
 
 
-@pytest.mark.parametrize("level", ["-O0", "-O2"])
 @pytest.mark.parametrize("target", list(PACKAGES))
-def test_another_machine_gives_the_promised_bits(
-    target: str, level: str, export: Path, tmp_path: Path, require_tool: Tool
-) -> None:
+def test_another_machine_gives_the_promised_bits(target: str, export: Path, tmp_path: Path, require_tool: Tool) -> None:
     ready(target, require_tool)
-    assert made(target, export, tmp_path, f"LEVEL={level}", f"SAMPLES={SHORT}") == BEGINNING
+    assert made(target, export, tmp_path, f"SAMPLES={SHORT}") == BEGINNING
 
 
 @pytest.mark.full
+@pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("target", list(PACKAGES))
-def test_another_machine_goes_all_the_way(target: str, export: Path, tmp_path: Path, require_tool: Tool) -> None:
+def test_another_machine_goes_all_the_way(
+    target: str, level: str, export: Path, tmp_path: Path, require_tool: Tool
+) -> None:
     ready(target, require_tool)
-    assert made(target, export, tmp_path) == WHOLE
+    assert made(target, export, tmp_path, f"LEVEL={level}") == WHOLE
 
 
 def test_a_fused_multiply_add_would_be_seen(export: Path, tmp_path: Path, require_tool: Tool) -> None:
@@ -209,4 +209,4 @@ def test_a_fused_multiply_add_would_be_seen(export: Path, tmp_path: Path, requir
         return np.fromfile(tmp_path / "aarch64.bin").reshape(-1, SHORT // 100 + 1)[6]
 
     apart = np.abs(command_of("off") - command_of("fast"))
-    assert apart[len(apart) // 2 :].max() > 1.0  # N m
+    assert apart[len(apart) // 2 :].max() > 10.0  # N m
