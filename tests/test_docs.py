@@ -38,6 +38,8 @@ STEPS = 100  # of every documented run
 ELSEWHERE = {
     "make reproduce": "minutes; tests/runner/paper/test_paper.py reproduces a group",
     "make test": "this very test among them",
+    "make -C examples/equal_bits host": "tests/runner/test_reproducible_chatter.py does",
+    "make -C examples/equal_bits aarch64 SAMPLES=10000": "tests/runner/test_reproducible_chatter.py does",
 }
 """Commands that are not run here, and why not."""
 
