@@ -1,8 +1,10 @@
 """Every example is built and run, with the export that is committed."""
 
 import json
+import math
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -10,6 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+import pyarrow
+import pyarrow.parquet
 import pytest
 from arms import structure_of, values_of
 from chains import chain, numbers_for
@@ -19,7 +23,7 @@ from springline.codegen.export.c import generate_files
 from springline.codegen.files import write_tree
 from springline.model.mechanisms import MECHANISMS
 from springline.model.structure import SignalShape
-from springline.runner import load_scenario
+from springline.runner import load_scenario, simulate
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES, EXPORT = ROOT / "examples", ROOT / "generated"
@@ -111,6 +115,58 @@ def test_casadi_external(tmp_path: Path) -> None:
     assert "springline_plant:(b[3],db[3],ddb[3],x[8],u[2])->(dx[8]) External" in printed
     frequencies = json.loads(printed.splitlines()[-1].split(": ")[1])
     assert frequencies == pytest.approx([1036.5, 1414.7], abs=0.2)  # sqrt of the eigenvalues of (M1^-1 + M2^-1) K
+
+
+@pytest.fixture
+def own_controller(tmp_path: Path) -> Path:
+    """A copy of that example beside a copy of the board that it is run on."""
+    for name in ("cortex_m", "own_controller"):
+        shutil.copytree(EXAMPLES / name, tmp_path / name, ignore=shutil.ignore_patterns("build", "__pycache__"))
+    return tmp_path / "own_controller"
+
+
+def test_own_controller_is_run_as_its_readme_says(own_controller: Path, require_tool: Callable[..., str]) -> None:
+    """And a Cortex-M7 computes what the simulation has, bit for bit."""
+    require_tool("arm-none-eabi-gcc", HINT)
+    require_tool("qemu-system-arm", HINT)
+    blocks = re.findall(r"^```sh\n(.*?)^```", (own_controller / "README.md").read_text(), re.MULTILINE | re.DOTALL)
+    path = {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    script = ["set -e", f"cd {own_controller}", "".join(blocks).replace("-o ship\n", "-o ship --no-plot\n")]
+    printed = run("sh", "-c", "\n".join(script), environment=path)
+    assert "1000 control steps and 200 plant steps: all bits as expected" in printed
+    assert "output as on this machine, bit for bit" in printed
+
+    header, *lines = (own_controller / "adrc_m7/m7/main.txt").read_text().splitlines()
+    board = np.array([[float(word) for word in line.split(",")] for line in lines])
+    simulated = pyarrow.parquet.read_table(own_controller / "ship/trajectory.parquet")
+    rows = np.rint(board[:, 0] / 1e-3).astype(int)  # the simulation has a row a sample
+    for name, column in zip(header.split(","), board.T, strict=True):
+        np.testing.assert_array_equal(simulated[name].to_numpy()[rows], column, name)
+    assert {"z_e_hat_lift", "z_d_hat_rotation"} <= set(simulated.column_names)
+
+    rms = {
+        folder: pyarrow.parquet.read_table(own_controller / folder / "metrics.parquet")["rms_error_lift"][0].as_py()
+        for folder in ("ship", "yardstick")
+    }
+    assert rms == {"ship": pytest.approx(0.29e-3, rel=0.02), "yardstick": pytest.approx(1.5e-3, rel=0.02)}
+    sweep = [pyarrow.parquet.read_table(part) for part in sorted((own_controller / "payloads").glob("part-*.parquet"))]
+    table = pyarrow.concat_tables(sweep)
+    chatters = table["chatter_lift"].to_numpy() > 20.0
+    np.testing.assert_array_equal(chatters, table["control.adrc.w_o"].to_numpy() == 400.0)
+
+
+@pytest.mark.full
+def test_own_controller_does_not_wind_up(own_controller: Path) -> None:
+    """The overshoots that its README names, far from the reference at first and with motors at their limits."""
+    text = (own_controller / "adrc.py").read_text()
+    told = "        def dz(limited):\n"
+    assert text.count(told) == 1
+    (own_controller / "adrc.py").write_text(text.replace(told, f"{told}            limited = u\n"))
+    start = {"initial.q": [0.2, 0.8], "initial.dq": [math.pi, math.pi / 2]}
+    for folder, overshoot in ((EXAMPLES / "own_controller", 0.4e-3), (own_controller, 147e-3)):
+        result = simulate(load_scenario(folder / "ship.toml", start))
+        assert max(result.trajectory["e_lift"].to_numpy()) == pytest.approx(overshoot, rel=0.2)
+        assert result.metrics["U_max_lift"][0].as_py() == 1500.0
 
 
 HINT = "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
