@@ -4,6 +4,7 @@ import json
 import math
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -17,6 +18,7 @@ import pyarrow.parquet
 import pytest
 from arms import structure_of, values_of
 from chains import chain, numbers_for
+from typer.testing import CliRunner
 
 from springline.codegen.export import bind
 from springline.codegen.export.c import generate_files
@@ -24,6 +26,7 @@ from springline.codegen.files import write_tree
 from springline.model.mechanisms import MECHANISMS
 from springline.model.structure import SignalShape
 from springline.runner import load_scenario, simulate
+from springline.runner.cli import app
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES, EXPORT = ROOT / "examples", ROOT / "generated"
@@ -125,14 +128,22 @@ def own_controller(tmp_path: Path) -> Path:
     return tmp_path / "own_controller"
 
 
-def test_own_controller_is_run_as_its_readme_says(own_controller: Path, require_tool: Callable[..., str]) -> None:
+def test_own_controller_is_run_as_its_readme_says(
+    own_controller: Path, require_tool: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """And a Cortex-M7 computes what the simulation has, bit for bit."""
     require_tool("arm-none-eabi-gcc", HINT)
     require_tool("qemu-system-arm", HINT)
-    blocks = re.findall(r"^```sh\n(.*?)^```", (own_controller / "README.md").read_text(), re.MULTILINE | re.DOTALL)
-    path = {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
-    script = ["set -e", f"cd {own_controller}", "".join(blocks).replace("-o ship\n", "-o ship --no-plot\n")]
-    printed = run("sh", "-c", "\n".join(script), environment=path)
+    monkeypatch.chdir(own_controller)
+    blocks = re.findall(r"^```sh\n(.*?)^```", Path("README.md").read_text(), re.MULTILINE | re.DOTALL)
+    for line in "".join(blocks).splitlines():
+        program, *arguments = shlex.split(line.replace("$PWD", str(own_controller)))
+        if program == "springline":
+            quick = ["--no-plot"] if arguments[0] == "run" else ["--jobs", "1"] if arguments[0] == "batch" else []
+            done = CliRunner().invoke(app, [*arguments, *quick], prog_name="springline")
+            assert done.exit_code == 0, f"{line}\n{done.output}"
+        else:
+            printed = run(program, *arguments)
     assert "1000 control steps and 200 plant steps: all bits as expected" in printed
     assert "output as on this machine, bit for bit" in printed
 
