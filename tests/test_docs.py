@@ -38,7 +38,7 @@ STEPS = 100  # of every documented run
 ELSEWHERE = {
     "make reproduce": "minutes; tests/runner/paper/test_paper.py reproduces a group",
     "make test": "this very test among them",
-    "make -C ../cortex_m m7 EXPORT=$PWD/adrc_c BUILD=$PWD/adrc_m7": "tests/test_examples.py does, as the example's README says",
+    "make -C ../cortex_m m7 EXPORT=$PWD/adrc_c BUILD=$PWD/adrc_m7": "tests/test_examples.py runs the README",
 }
 """Commands that are not run here, and why not."""
 
