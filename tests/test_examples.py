@@ -18,6 +18,7 @@ import pyarrow.parquet
 import pytest
 from arms import structure_of, values_of
 from chains import chain, numbers_for
+from fmi_client import check_restored
 from typer.testing import CliRunner
 
 from springline.codegen.export import bind
@@ -166,6 +167,16 @@ def test_own_controller_is_run_as_its_readme_says(
     np.testing.assert_array_equal(chatters, table["control.adrc.w_o"].to_numpy() == 400.0)
 
 
+@pytest.mark.parametrize("target", ["fmu2", pytest.param("fmu3", marks=pytest.mark.full)])
+def test_own_controller_as_an_fmu_keeps_its_states(own_controller: Path, target: str) -> None:
+    folder = own_controller / target
+    done = CliRunner().invoke(app, ["export", target, str(own_controller / "ship.toml"), "-o", str(folder)])
+    assert done.exit_code == 0, done.output
+    [path] = folder.glob("*.fmu")
+    names = ["z_e_hat_lift", "z_de_hat_rotation", "z_d_hat_lift", "U_rotation", "q1_lift"]
+    check_restored(path, own_controller, names, 5e-4, 7, 60)  # saved between two samples
+
+
 @pytest.mark.full
 def test_own_controller_does_not_wind_up(own_controller: Path) -> None:
     """The overshoots that its README names, far from the reference at first and with motors at their limits."""
@@ -253,6 +264,40 @@ def test_firmware_of_seven_joints(
     alone = for_cortex_m7(export, tmp_path, BOARD / "control_only.c", code, hosted=False)
     text, data, *_ = run("arm-none-eabi-size", alone).splitlines()[1].split()
     assert int(text) < FLASH[arm] and int(data) == 0
+
+
+OTHERS_FULL = [
+    ("computed_torque", "none"),
+    ("computed_torque", "disturbance"),
+    ("nonsingular_terminal", "none"),
+    ("nonsingular_terminal", "extended_state"),
+    ("super_twisting", "none"),
+    ("terminal_sliding", "disturbance"),
+]
+
+
+@pytest.mark.parametrize(
+    ("controller", "observer"),
+    [("super_twisting", "extended_state"), *(pytest.param(*pair, marks=pytest.mark.full) for pair in OTHERS_FULL)],
+)
+def test_firmware_of_packaged_controllers(
+    controller: str, observer: str, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    """A Cortex-M7 has this machine's bits over a sequence of samples, and in closed loop."""
+    require_tool("arm-none-eabi-gcc", HINT)
+    require_tool("qemu-system-arm", HINT)
+    chosen = {"control.controller": controller, "control.observer": observer, "drive.spring_damping": [600.0, 5.0]}
+    scenario = load_scenario("paper/group1_shake", chosen)
+    export = tmp_path / "export"
+    write_tree(export, *generate_files(bind(scenario.structure(), scenario.values())))
+    code = export / "src/springline.c"
+    check = for_cortex_m7(export, tmp_path, export / "self_check.c", export / "src/springline_model.c", code)
+    assert "1000 control steps and 200 plant steps: all bits as expected" in printed_on_cortex_m7(check, export)
+    board = printed_on_cortex_m7(for_cortex_m7(export, tmp_path, export / "main.c", code), export)
+    host = tmp_path / "main"
+    includes = [f"-I{export}/include", f"-I{export}/src"]
+    run("cc", "-std=c99", "-O1", "-ffp-contract=off", *includes, export / "main.c", code, "-o", host)
+    assert board == run(host)
 
 
 def test_firmware(tmp_path: Path, require_tool: Callable[..., str]) -> None:

@@ -1,9 +1,9 @@
 """Active disturbance rejection, from encoders alone: a controller whose states are an observer.
 
 Error form: R. Madonski, S. Shao, H. Zhang, Z. Gao, J. Yang, S. Li, General error-based active disturbance rejection
-control for swift industrial implementations, Control Engineering Practice 84 (2019). One bandwidth for the observer, one
-for the controller: Z. Gao, Scaling and bandwidth-parameterization based controller tuning, American Control Conference
-2003. Here it has the arm's model besides, so that the disturbance is only what the model does not know.
+control for swift industrial implementations, Control Engineering Practice 84 (2019). One bandwidth for the observer
+and one for the controller: Z. Gao, Scaling and bandwidth-parameterization based controller tuning, American Control
+Conference 2003. Here it has the arm's model besides, so that the disturbance is only what the model does not know.
 """
 
 import casadi as ca
@@ -17,8 +17,8 @@ class Adrc(Controller):
 
     e = q1d - q1,  dde = ddq1d - H^-1 (u - C dq1 - G) - d
 
-    The observer has three poles at -w_o. Its d is the integral action; it is told the command that U_max let through, and
-    so does not wind up.
+    The observer has three poles at -w_o. Its d is the integral action; it is told the command that U_max let through,
+    and so does not wind up.
     """
 
     title = "active disturbance rejection from the encoders alone"
