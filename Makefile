@@ -39,7 +39,7 @@ format: .venv/installed ## let ruff put the code in order
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-docs-tables: .venv/installed ## print the tables of columns and metrics in docs/scenarios.md anew
+docs-tables: .venv/installed ## print the tables of columns, metrics and sensors in docs/scenarios.md anew
 	$(BIN)/python -m runner.report.docs_tables --write
 
 docs-controllers: .venv/installed ## simulate the table of docs/controllers.md anew; takes minutes

@@ -77,7 +77,9 @@ class PositionNoise(Effect):
 
     name, sampled, noisy = "position_noise", True, True
     parameters = (
-        Parameter("position_noise", "{q}", 0.0, "standard deviation of a measured position", NON_NEGATIVE, True),
+        Parameter(
+            "position_noise", "{q}", 0.0, "standard deviation of the noise on a measured position", NON_NEGATIVE, True
+        ),
     )
 
     def sense(self, y: Measured, p: Values, noise: Measured) -> Measured:
@@ -92,7 +94,9 @@ class VelocityNoise(Effect):
 
     name, sampled, noisy = "velocity_noise", True, True
     parameters = (
-        Parameter("velocity_noise", "{q}/s", 0.0, "standard deviation of a measured rate", NON_NEGATIVE, True),
+        Parameter(
+            "velocity_noise", "{q}/s", 0.0, "standard deviation of the noise on a measured rate", NON_NEGATIVE, True
+        ),
     )
 
     def sense(self, y: Measured, p: Values, noise: Measured) -> Measured:
@@ -121,7 +125,11 @@ class PositionResolution(Effect):
         return {item: shown(value) if item in POSITIONS else value for item, value in y.items()}
 
 
-SENSORS: tuple[Effect, ...] = (PositionNoise(), VelocityNoise(), PositionResolution())
+SENSORS: tuple[Effect, ...] = (
+    PositionNoise(),
+    VelocityNoise(),
+    PositionResolution(),
+)
 """What [sensor] has, in the order in which it acts: an encoder's steps are of what noise has moved."""
 
 

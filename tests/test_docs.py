@@ -40,6 +40,7 @@ ELSEWHERE = {
     "make test": "this very test among them",
     "make -C examples/equal_bits host": "tests/runner/test_reproducible_chatter.py does",
     "make -C examples/equal_bits aarch64 SAMPLES=10000": "tests/runner/test_reproducible_chatter.py does",
+    "make -C ../cortex_m m7 EXPORT=$PWD/adrc_c BUILD=$PWD/adrc_m7": "tests/test_examples.py runs the README",
 }
 """Commands that are not run here, and why not."""
 
@@ -84,13 +85,14 @@ def commands(text: str) -> list[str]:
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with what the pages take for granted: a user's scenarios, a checkout's generated/, an example."""
+    """A folder with what the pages take for granted: a user's scenarios, a checkout's generated/, two examples."""
     for name in ("my_arm.toml", "my_scenario.toml"):
         (tmp_path / name).touch()
     shutil.copytree(ROOT / "generated", tmp_path / "generated")
-    for path in (ROOT / "examples/own_mechanism").iterdir():
-        if path.is_file():
-            shutil.copy(path, tmp_path)
+    for example in ("own_mechanism", "own_controller"):
+        for path in (ROOT / "examples" / example).iterdir():
+            if path.is_file():
+                shutil.copy(path, tmp_path)
     monkeypatch.chdir(tmp_path)
     shorten(monkeypatch)
     return tmp_path

@@ -1,8 +1,11 @@
 """Every example is built and run, with the export that is committed."""
 
 import json
+import math
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -10,16 +13,21 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+import pyarrow
+import pyarrow.parquet
 import pytest
 from arms import structure_of, values_of
 from chains import chain, numbers_for
+from fmi_client import check_restored
+from typer.testing import CliRunner
 
 from springline.codegen.export import bind
 from springline.codegen.export.c import generate_files
 from springline.codegen.files import write_tree
 from springline.model.mechanisms import MECHANISMS
 from springline.model.structure import SignalShape
-from springline.runner import load_scenario
+from springline.runner import load_scenario, simulate
+from springline.runner.cli import app
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES, EXPORT = ROOT / "examples", ROOT / "generated"
@@ -113,6 +121,76 @@ def test_casadi_external(tmp_path: Path) -> None:
     assert frequencies == pytest.approx([1036.5, 1414.7], abs=0.2)  # sqrt of the eigenvalues of (M1^-1 + M2^-1) K
 
 
+@pytest.fixture
+def own_controller(tmp_path: Path) -> Path:
+    """A copy of that example beside a copy of the board that it is run on."""
+    for name in ("cortex_m", "own_controller"):
+        shutil.copytree(EXAMPLES / name, tmp_path / name, ignore=shutil.ignore_patterns("build", "__pycache__"))
+    return tmp_path / "own_controller"
+
+
+def test_own_controller_is_run_as_its_readme_says(
+    own_controller: Path, require_tool: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And a Cortex-M7 computes what the simulation has, bit for bit."""
+    require_tool("arm-none-eabi-gcc", HINT)
+    require_tool("qemu-system-arm", HINT)
+    monkeypatch.chdir(own_controller)
+    blocks = re.findall(r"^```sh\n(.*?)^```", Path("README.md").read_text(), re.MULTILINE | re.DOTALL)
+    for line in "".join(blocks).splitlines():
+        program, *arguments = shlex.split(line.replace("$PWD", str(own_controller)))
+        if program == "springline":
+            quick = ["--no-plot"] if arguments[0] == "run" else ["--jobs", "1"] if arguments[0] == "batch" else []
+            done = CliRunner().invoke(app, [*arguments, *quick], prog_name="springline")
+            assert done.exit_code == 0, f"{line}\n{done.output}"
+        else:
+            printed = run(program, *arguments)
+    assert "1000 control steps and 200 plant steps: all bits as expected" in printed
+    assert "output as on this machine, bit for bit" in printed
+
+    header, *lines = (own_controller / "adrc_m7/m7/main.txt").read_text().splitlines()
+    board = np.array([[float(word) for word in line.split(",")] for line in lines])
+    simulated = pyarrow.parquet.read_table(own_controller / "ship/trajectory.parquet")
+    rows = np.rint(board[:, 0] / 1e-3).astype(int)  # the simulation has a row a sample
+    for name, column in zip(header.split(","), board.T, strict=True):
+        np.testing.assert_array_equal(simulated[name].to_numpy()[rows], column, name)
+    assert {"z_e_hat_lift", "z_d_hat_rotation"} <= set(simulated.column_names)
+
+    rms = {
+        folder: pyarrow.parquet.read_table(own_controller / folder / "metrics.parquet")["rms_error_lift"][0].as_py()
+        for folder in ("ship", "yardstick")
+    }
+    assert rms == {"ship": pytest.approx(0.29e-3, rel=0.02), "yardstick": pytest.approx(1.5e-3, rel=0.02)}
+    sweep = [pyarrow.parquet.read_table(part) for part in sorted((own_controller / "payloads").glob("part-*.parquet"))]
+    table = pyarrow.concat_tables(sweep)
+    chatters = table["chatter_lift"].to_numpy() > 20.0
+    np.testing.assert_array_equal(chatters, table["control.adrc.w_o"].to_numpy() == 400.0)
+
+
+@pytest.mark.parametrize("target", ["fmu2", pytest.param("fmu3", marks=pytest.mark.full)])
+def test_own_controller_as_an_fmu_keeps_its_states(own_controller: Path, target: str) -> None:
+    folder = own_controller / target
+    done = CliRunner().invoke(app, ["export", target, str(own_controller / "ship.toml"), "-o", str(folder)])
+    assert done.exit_code == 0, done.output
+    [path] = folder.glob("*.fmu")
+    names = ["z_e_hat_lift", "z_de_hat_rotation", "z_d_hat_lift", "U_rotation", "q1_lift"]
+    check_restored(path, own_controller, names, 5e-4, 7, 60)  # saved between two samples
+
+
+@pytest.mark.full
+def test_own_controller_does_not_wind_up(own_controller: Path) -> None:
+    """The overshoots that its README names, far from the reference at first and with motors at their limits."""
+    text = (own_controller / "adrc.py").read_text()
+    told = "        def dz(limited):\n"
+    assert text.count(told) == 1
+    (own_controller / "adrc.py").write_text(text.replace(told, f"{told}            limited = u\n"))
+    start = {"initial.q": [0.2, 0.8], "initial.dq": [math.pi, math.pi / 2]}
+    for folder, overshoot in ((EXAMPLES / "own_controller", 0.4e-3), (own_controller, 147e-3)):
+        result = simulate(load_scenario(folder / "ship.toml", start))
+        assert max(result.trajectory["e_lift"].to_numpy()) == pytest.approx(overshoot, rel=0.2)
+        assert result.metrics["U_max_lift"][0].as_py() == 1500.0
+
+
 HINT = "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
 BOARD = EXAMPLES / "cortex_m"
 FLASH = {"planar": 32_000, "quarter turns": 36_000, "any frames": 56_000}  # a control step, its mathematics and startup
@@ -186,6 +264,40 @@ def test_firmware_of_seven_joints(
     alone = for_cortex_m7(export, tmp_path, BOARD / "control_only.c", code, hosted=False)
     text, data, *_ = run("arm-none-eabi-size", alone).splitlines()[1].split()
     assert int(text) < FLASH[arm] and int(data) == 0
+
+
+OTHERS_FULL = [
+    ("computed_torque", "none"),
+    ("computed_torque", "disturbance"),
+    ("nonsingular_terminal", "none"),
+    ("nonsingular_terminal", "extended_state"),
+    ("super_twisting", "none"),
+    ("terminal_sliding", "disturbance"),
+]
+
+
+@pytest.mark.parametrize(
+    ("controller", "observer"),
+    [("super_twisting", "extended_state"), *(pytest.param(*pair, marks=pytest.mark.full) for pair in OTHERS_FULL)],
+)
+def test_firmware_of_packaged_controllers(
+    controller: str, observer: str, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    """A Cortex-M7 has this machine's bits over a sequence of samples, and in closed loop."""
+    require_tool("arm-none-eabi-gcc", HINT)
+    require_tool("qemu-system-arm", HINT)
+    chosen = {"control.controller": controller, "control.observer": observer, "drive.spring_damping": [600.0, 5.0]}
+    scenario = load_scenario("paper/group1_shake", chosen)
+    export = tmp_path / "export"
+    write_tree(export, *generate_files(bind(scenario.structure(), scenario.values())))
+    code = export / "src/springline.c"
+    check = for_cortex_m7(export, tmp_path, export / "self_check.c", export / "src/springline_model.c", code)
+    assert "1000 control steps and 200 plant steps: all bits as expected" in printed_on_cortex_m7(check, export)
+    board = printed_on_cortex_m7(for_cortex_m7(export, tmp_path, export / "main.c", code), export)
+    host = tmp_path / "main"
+    includes = [f"-I{export}/include", f"-I{export}/src"]
+    run("cc", "-std=c99", "-O1", "-ffp-contract=off", *includes, export / "main.c", code, "-o", host)
+    assert board == run(host)
 
 
 def test_firmware(tmp_path: Path, require_tool: Callable[..., str]) -> None:

@@ -9,6 +9,11 @@ from springline.model.control.super_twisting import SuperTwisting
 from springline.model.control.terminal_sliding import TerminalSliding
 from springline.model.registry import Registry
 
-_PACKAGED = (TerminalSliding(), ComputedTorque(), SuperTwisting(), NonsingularTerminal())
+_PACKAGED = (
+    TerminalSliding(),
+    ComputedTorque(),
+    SuperTwisting(),
+    NonsingularTerminal(),
+)
 
 CONTROLLERS: Registry[Controller] = Registry(Controller, {item.name: item for item in _PACKAGED}, check_controller)

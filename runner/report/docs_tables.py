@@ -2,9 +2,9 @@
 
     python -m runner.report.docs_tables [--write]
 
-Prints the columns of a trajectory, on a base that moves in every way, and the metrics of a run of the packaged arm;
---write (`make docs-tables`) puts them into docs/scenarios.md, between the comments that name them. The text around them
-is written by hand.
+Prints the columns of a trajectory, on a base that moves in every way, the metrics of a run of the packaged arm, and the
+keys of sensors; --write (`make docs-tables`) puts them into docs/scenarios.md, between the comments that name them. The
+text around them is written by hand.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from springline.model.base import COORDINATES
+from springline.model.hardware import SENSORS
 from springline.model.metrics import METRICS
-from springline.model.parameters import Joint
+from springline.model.parameters import Joint, Parameter
 from springline.model.quantities import Quantity
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
@@ -51,6 +52,15 @@ def table(quantities: Iterable[Quantity], joints: Sequence[Joint]) -> str:
     return "\n".join(rows) + "\n"
 
 
+def keys(parameters: Iterable[Parameter], joints: Sequence[Joint]) -> str:
+    """Name, meaning and unit of what each joint has one of, in Markdown."""
+    rows = ["| key | what | unit |", "|---|---|---|"]
+    for item in parameters:
+        units = ", ".join(dict.fromkeys(item.unit_of(joint) for joint in joints))
+        rows.append(f"| `{item.name}` | {cell(item.meaning)} | {cell(units)} |")
+    return "\n".join(rows) + "\n"
+
+
 def cell(text: str) -> str:
     """Plain text as it stands in a cell of a table in Markdown."""
     return text.replace("|", r"\|").replace("^2", "²")
@@ -59,7 +69,11 @@ def cell(text: str) -> str:
 def tables() -> dict[str, str]:
     """The tables by name."""
     system = System(Structure(base_motion=SignalShape("sine", (1,) * len(COORDINATES))))
-    return {"trajectory": table(system.columns, system.joints), "metrics": table(METRICS, system.joints)}
+    return {
+        "sensors": keys([item for effect in SENSORS for item in effect.parameters], system.joints),
+        "trajectory": table(system.columns, system.joints),
+        "metrics": table(METRICS, system.joints),
+    }
 
 
 def written(page: str) -> str:

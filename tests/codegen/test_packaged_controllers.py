@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from arms import structure_of, values_of
-from fmi_client import Client
+from fmi_client import Client, check_restored
 
 from springline.codegen.export import bind
 from springline.codegen.export.c import generate_files
@@ -94,6 +94,16 @@ def test_the_loop_in_an_fmu_is_the_loop(chosen: dict[str, Any], tmp_path: Path) 
         rows.append(client.get(names))
     np.testing.assert_array_equal(rows, run(structure, True, values, 5).trajectory[0][:, 1:])
     client.slave.freeInstance()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_saved_state_of_an_fmu_carries_controller_and_observer(version: Any, tmp_path: Path) -> None:
+    structure, values = case(CASES[0])
+    settings = Settings(duration=STEPS * STEP, step=STEP, period=HOLD * STEP)
+    content = fmu(structure, values, settings, part="loop", version=version, identifier="kept", name="kept")
+    (tmp_path / "kept.fmu").write_bytes(content)
+    names = ["z_nu_lift", "z_nu_rotation", "z_v_hat_lift", "z_d_hat_lift", "z_d_hat_rotation", "U_lift", "q1_rotation"]
+    check_restored(tmp_path / "kept.fmu", tmp_path, names, HOLD * STEP / 2, 7, 60)  # saved between two samples
 
 
 def test_an_importer_s_base_reaches_the_controller(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from springline.model.hardware import SENSORS
 from springline.model.parameters import Joint
 from springline.model.quantities import Quantity
 from springline.model.system import System
@@ -28,6 +29,13 @@ def test_every_column_and_every_metric_has_its_row() -> None:
             own = entry.name if entry.joint is None else entry.name.removesuffix(entry.joint.name) + "<joint>"
             (row,) = (row for row in rows if row.startswith(f"| `{own}` |"))
             assert entry.unit.replace("^2", "²") in row
+
+
+def test_every_effect_of_a_sensor_has_its_row() -> None:
+    rows = tables()["sensors"].splitlines()[2:]
+    names = [item.name for effect in SENSORS for item in effect.parameters]
+    assert [row.split("`")[1] for row in rows] == names
+    assert rows[names.index("velocity_noise")].endswith("| m/s, rad/s |")
 
 
 def test_a_quantity_of_the_joints_is_one_row_with_their_units() -> None:

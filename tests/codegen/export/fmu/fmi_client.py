@@ -137,3 +137,34 @@ def driven(client: Client, names: Sequence[str], start: float = 0.0) -> NDArray[
         client.step(start + k * EVERY * STEP, EVERY * STEP)
         rows.append(client.get(names))
     return np.array(rows)
+
+
+def check_restored(path: Path, folder: Path, names: Sequence[str], step: float, first: int, last: int) -> None:
+    """What an FMU shows from step `first` to `last` has the same bits again from a state that was saved at `first`.
+
+    In the instance that was saved, and in another one to which the state came as bytes. All names must move meanwhile.
+    """
+
+    def onwards(client: Client) -> NDArray[np.float64]:
+        rows = [client.get(names)]
+        for k in range(first, last):
+            client.step(k * step, step)
+            rows.append(client.get(names))
+        return np.array(rows)
+
+    client = Client(path, folder).start()
+    for k in range(first):
+        client.step(k * step, step)
+    saved = client.slave.getFMUState()
+    data = client.slave.serializeFMUState(saved)
+    seen = onwards(client)
+    assert (np.ptp(seen, axis=0) > 0.0).all()
+    client.slave.setFMUState(saved)
+    np.testing.assert_array_equal(onwards(client), seen)
+    other = Client(path, folder)
+    foreign = other.slave.deserializeFMUState(data)
+    other.slave.setFMUState(foreign)
+    np.testing.assert_array_equal(onwards(other), seen)
+    for instance, state in ((client, saved), (other, foreign)):
+        instance.slave.freeFMUState(state)
+        instance.slave.freeInstance()
