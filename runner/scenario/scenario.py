@@ -197,9 +197,10 @@ class Scenario:
             effects=tuple(
                 effect.name
                 for effect in (*SENSORS, *ACTUATORS)
-                if any(value != effect.absent for value in self.document[effect.table][effect.name])
+                if any(value != effect.absent for value in self.document[effect.table].get(effect.name, ()))
             ),
             delay=round(self.document["actuator"]["delay"] / self.step),
+            differenced=self.document["sensor"]["velocity"] == "differenced",
         )
 
     def _has(self, name: str) -> bool:
@@ -486,6 +487,9 @@ class Scenario:
                 document[table] = {"kind": kind} | stays
         if overrides.get("control.mode") == "continuous":
             document["control"].pop("period", None)
+        velocity = overrides.get("sensor.velocity")
+        if isinstance(velocity, str):
+            document["sensor"].pop(schema.NOT_WITH_VELOCITY.get(velocity, ""), None)
         for name, registry in (("controller", CONTROLLERS), ("law", LAWS), ("observer", OBSERVERS)):
             old = document["control"][name]
             if overrides.get(f"control.{name}", old) != old:
