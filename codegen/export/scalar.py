@@ -210,7 +210,12 @@ class ScalarPrinter:
     """
 
     def __init__(
-        self, export: Export, functions: Sequence[ca.Function], *, hoist: bool, constants: Mapping[str, float] | None = None
+        self,
+        export: Export,
+        functions: Sequence[ca.Function],
+        *,
+        hoist: bool,
+        constants: Mapping[str, float] | None = None,
     ) -> None:
         self._export = export
         self._real: Real = export.real

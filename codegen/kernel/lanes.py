@@ -234,6 +234,7 @@ class _Emitter:
         sample = control | ({"measured": measured} if measured else {}) | ({"ahead": memory} if memory else {})
         sampling += ", double period" if memory else ""
         differenced = self.program.system.structure.differenced
+        sampled = measured or actuated or differenced  # whatever it is, it is of samples
         times = "double step, " * actuated + "double period, " * differenced
         begun = [*outputs["start"][0], *map(self.graph.constant, self.program.system.z_start)]
         at_time = f"double time, const double *data, {_GIVEN}"
@@ -275,7 +276,7 @@ class _Emitter:
         return "\n".join([
             *parts,
             "/* ---- at every evaluation, where a block does not hold ---- */\n",
-            *([] if measured or actuated or differenced else [self._complete("closed", now, {"dx": states + memory, **control})]),
+            *([] if sampled else [self._complete("closed", now, {"dx": states + memory, **control})]),
             self._complete("control", sampling, sample),
             self._complete("error", now, {"e": n, "sigma": n}),
             self._complete("plant", f"{now}, const sl_group *u", {"dx": states}),

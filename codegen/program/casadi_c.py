@@ -82,12 +82,13 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
         rates = call("rates", w, s, *at, *noise, p, r, results=[f"(double *)(dx + {states})"])
         closed = f"{control}\n{rates}"
     actuated, actuate = "actuate" in functions, ""
+    told = "double step, " * actuated + "double period, " * differenced
     if actuated:
         given = "double step, const sl_group *arrived, const sl_group *m, const sl_group *p, const sl_group *r"
         results = ["(double *)acting", "(double *)ahead"]
         body = call("actuate", f"{flat}arrived", f"{flat}m", "&step", p, results=results)
         actuate = f"static inline void kernel_actuate({given}, sl_group *acting, sl_group *ahead) {{\n{body}\n}}\n\n"
-    if not (measured or actuated or differenced):  # continuous control has no samples, and so nothing that is measured at them
+    if not (measured or actuated or differenced):  # continuous control has no samples, and so none of these
         closed = f"""static inline void kernel_closed({state}, sl_group *dx, {computed}) {{
 {closed}
   kernel_plant(now, x, (const sl_group *)u, p, r, dx);
@@ -106,7 +107,7 @@ enum {{ SL_NUMBER_W = {program.size("w")} }};
 #define CASADI_SYMBOL_EXPORT __attribute__((visibility("hidden")))
 #include "functions.c"
 
-static inline void kernel_run(const sl_group *p, {"double step, " * actuated}{"double period, " * differenced}sl_group *r) {{
+static inline void kernel_run(const sl_group *p, {told}sl_group *r) {{
 {call("run", p, results=["(double *)r"])}
 }}
 

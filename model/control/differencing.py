@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 
 from springline.model.control.controller import states_of
-from springline.model.parameters import LIMIT, Joint, Parameter, Values
+from springline.model.parameters import LIMIT, Joint, Parameter
 from springline.model.quantities import DERIVATIVES, Q1, Q2, Quantity
 from springline.model.terms import named, section
 
@@ -31,7 +31,9 @@ _BEGUN = Quantity("has_last", "k > 0", "1", "whether there is a sample before to
 
 
 def _last(position: Quantity) -> Quantity:
-    return Quantity(f"{position.name}_last", rf"{position.symbol}^-", "{q}", f"{position.meaning}, at the sample before")
+    return Quantity(
+        f"{position.name}_last", rf"{position.symbol}^-", "{q}", f"{position.meaning}, at the sample before"
+    )
 
 
 def _rate(position: Quantity) -> Quantity:

@@ -295,7 +295,7 @@ def _sampling_problems(document: Document, given: Mapping[str, object], where: s
 
 
 def _velocity_problems(sensor: dict[str, Any], given: Mapping[str, object], where: str) -> list[Problem]:
-    """Rates have noise where a sensor shows them, and a cutoff where they are differences; `sensor` keeps what counts."""
+    """Rates of a sensor may have noise, differences a cutoff; `sensor` keeps what counts."""
     velocity = sensor.get("velocity")
     if velocity not in schema.NOT_WITH_VELOCITY:
         return []

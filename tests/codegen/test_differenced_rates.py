@@ -1,4 +1,4 @@
-"""Rates that a controller makes out of positions by itself: as NumPy computes them, and with the same bits everywhere."""
+"""Rates that a controller makes out of positions: as NumPy computes them, and with the same bits everywhere."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ pytestmark = pytest.mark.usefixtures("other_arms")
 STEP, STEPS, HOLD, SEED = 1e-4, 300, 10, 77
 QUICK = ("-O0",)  # optimisation changes no bit: test_engines.py, test_fmu.py and test_export_c.py compare its levels
 WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", *QUICK, "-ffp-contract=off"]
+
 
 def elastic() -> Structure:
     return structure_of("transfer_manipulator", differenced=True, effects=("position_noise", "position_resolution"))
@@ -65,8 +66,8 @@ def trajectory(structure: Structure, values: np.ndarray, hold: int = HOLD, numbe
 def differenced(q: np.ndarray, cutoff: float, h: float) -> np.ndarray:
     """Of positions at samples: a difference behind a low-pass that sees it constant since the sample before."""
     kept, rates = np.exp(-cutoff * h), [0.0]
-    for before, now in zip(q[:-1], q[1:], strict=True):
-        rates.append(kept * rates[-1] + (1 - kept) * ((now - before) / h))
+    for difference in np.diff(q):
+        rates.append(kept * rates[-1] + (1 - kept) * (difference / h))
     return np.array(rates)
 
 
@@ -236,6 +237,6 @@ def test_the_controller_as_an_fmu_makes_out_rates(tmp_path: Path) -> None:
 def test_they_are_refused_where_control_is_continuous() -> None:
     with pytest.raises(ValueError, match="differenced rates are of samples"):
         KernelSpec(elastic(), False)
+    structure = structure_of("one_link", differenced=True)
     with pytest.raises(ValueError, match="differenced rates go by samples: expected a period"):
-        structure = structure_of("one_link", differenced=True)
         fmu(structure, values_of(structure), Settings(1.0, STEP), part="loop", version=3, identifier="a", name="a")

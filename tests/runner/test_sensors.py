@@ -66,7 +66,7 @@ def test_columns_of_what_is_measured_stand_beside_the_state() -> None:
         (SAMPLED | {"sensor.velocity": "difference"}, "did you mean 'differenced'?"),
         (DIFFERENCED | {"sensor.velocity_cutoff": 0.0}, "sensor.velocity_cutoff: expected a number > 0"),
         (DIFFERENCED | {"sensor.velocity_cutoff": -1.0}, "sensor.velocity_cutoff: expected a number > 0"),
-        (SAMPLED | {"sensor.velocity_cutoff": 300.0}, 'velocity_cutoff: only goes with sensor.velocity = "differenced"'),
+        (SAMPLED | {"sensor.velocity_cutoff": 300.0}, 'cutoff: only goes with sensor.velocity = "differenced"'),
         (DIFFERENCED | {"sensor.velocity_noise": 1.0}, 'velocity_noise: only goes with sensor.velocity = "measured"'),
     ],
 )
