@@ -41,6 +41,7 @@ class Structure:
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
     effects        properties of sensors and motors, by name, in the order in which they act
     delay          steps from a command to when it arrives at the motors
+    differenced    whether the controller is told of positions alone, and makes out the rates by itself
     disturbance    forces on the links, per joint; not even zero where its kind is "none"
     friction       damping and friction that there is, names of drive.FRICTION in their order
     initial_motor  where the motors start: with unloaded springs, with springs that carry the weight, or where they are
@@ -70,6 +71,7 @@ class Structure:
     observer_input: ObserverInput = "command"
     feedforward: Feedforward = "none"
     delay: int = 0
+    differenced: bool = False
 
     @property
     def base_coordinates(self) -> tuple[BaseCoordinate, ...]:

@@ -28,6 +28,7 @@ from springline.model.control import (
     OBSERVERS,
     SURFACE_PARAMETERS,
     U_MAX,
+    VELOCITY_CUTOFF,
     ArmModel,
     Condition,
     Controller,
@@ -36,6 +37,8 @@ from springline.model.control import (
     Observer,
     Observing,
     commanded,
+    differenced,
+    differencing_states,
     fast_control,
 )
 from springline.model.declared import column, expect_given, symbols_of
@@ -193,6 +196,7 @@ class System:
             [item for effect in effects if effect.table == table for item in effect.parameters]
             for table in ("sensor", "actuator")
         )
+        sensors += [VELOCITY_CUTOFF] if self.structure.differenced else []
         self._sensor = vector.table("sensor", sensors, self.joints)
         self._actuator = vector.table("actuator", motors, self.joints)
         self.actuators = tuple(effect.name for effect in effects if effect.table == "actuator")
@@ -310,6 +314,7 @@ class System:
     def controller_states(self) -> tuple[Quantity, ...]:
         """What z consists of, by the names of its columns."""
         states = (*self.controller.states, *(self.observer.states if self.observer else ()))
+        states += differencing_states(self.drive.state) if self.structure.differenced else ()
         return tuple(replace(state, name=f"z_{state.name}") for state in states)
 
     @property
@@ -373,6 +378,11 @@ class System:
         return dict(sensed(self.structure.effects, self._state, self._sensor, noise))
 
     @property
+    def judges(self) -> bool:
+        """Whether error and sliding variable of the state are others than those that the controller sees."""
+        return bool(self.measured) or self.structure.differenced
+
+    @property
     def columns(self) -> tuple[Quantity, ...]:
         """What a trajectory shows, in the order of the loop's rows."""
         return (
@@ -413,7 +423,7 @@ class System:
     @derived_property
     def functions(self) -> dict[str, ca.Function]:
         """All Functions, parameters symbolic. Those of the paper's equations first, then the loop's."""
-        real, signals = self.arm, self._commanded
+        real, signals = self.arm, self._sampled_control
         applied = actuated(self.structure.effects, self.u)
         with noted() as terms:
             dx = self.drive.plant(self.x, applied, real, self.mechanism, self._plant, self.disturbance)
@@ -498,6 +508,35 @@ class System:
         parts = dict(zip(signals.parts, others, strict=True))
         return ControlSignals(command, wished, parts, error, sigma, a_law, dz, ahead)
 
+    @derived_property
+    def _sampled_control(self) -> ControlSignals:
+        """What the controller computes of what it is told: of all of the state, or of its positions alone."""
+        seen = self._commanded
+        if not self.structure.differenced:
+            return seen
+        with noted() as terms:
+            own = self.z[self.z.numel() - self._differencing :]
+            rates, after = differenced(self._state, self.joints, own, self._sensor.velocity_cutoff, self.h)
+        told = ca.vertcat(*(rates.get(item, symbol) for item, symbol in self._state.items()))
+        named_before = self._terms["control"]
+        known = [seen.command, seen.wished, seen.error, seen.sigma, seen.a_law, seen.ahead, *seen.parts.values()]
+        with as_written():
+            values = ca.substitute([*known, *(term.value for term in named_before)], [self.x], [told])
+        command, wished, error, sigma, a_law, ahead, *others = values
+        parts = dict(zip(seen.parts, others, strict=False))
+        late = others[len(parts) :]
+        self._terms["control"] = (
+            *terms,
+            *(replace(term, value=value) for term, value in zip(named_before, late, strict=True)),
+        )
+        return ControlSignals(command, wished, parts, error, sigma, a_law, ca.SX(0, 1), ca.vertcat(ahead, after))
+
+    @property
+    def _differencing(self) -> int:
+        """How many entries of z, its last, are what differenced rates are made of."""
+        declared = differencing_states(self.drive.state) if self.structure.differenced else ()
+        return len(entries(declared, self.joints))
+
     def _associated(
         self, values: Sequence[ca.SX], terms: Sequence[Term], late: ca.SX | None = None
     ) -> tuple[list[ca.SX], tuple[Term, ...]]:
@@ -511,7 +550,7 @@ class System:
         model = ArmModel(nominal, self.q1, self.dq1, diagonal(self.mechanism.motor_inertia, self._nominal))
         y = Values({item.name: symbol for item, symbol in self._state.items()})
         own = len(entries(self.controller.states, self.joints))
-        z, z_observer = ca.vertsplit(self.z, [0, own, self.z.numel()])
+        z, z_observer, _ = ca.vertsplit(self.z, [0, own, self.z.numel() - self._differencing, self.z.numel()])
         ddq = self.ddq1d
         observing = None
         if self.measured_base:
@@ -586,7 +625,9 @@ class System:
                 ),
             }
         fed_in, fed_names = (base_in, base_names) if self.measured_base else ([], [])
-        ins, names = [*ref_in, *fed_in, x, *z_in], [*ref_names, *fed_names, "x", *z_names]
+        period_in, period_names = ([self.h], ["h"]) if self.structure.differenced else ([], [])
+        at, at_names = [*ref_in, *fed_in, x, *z_in], [*ref_names, *fed_names, "x", *z_names]
+        ins, names = [*at, *period_in], [*at_names, *period_names]
         if U_S in seen.parts:
             slow_outputs = [seen.parts[U_S], seen.error, *sigma_out]
             result |= function("slow_control", ins, slow_outputs, names, ["u_s", "e", *sigma_names])
@@ -599,11 +640,14 @@ class System:
         )
         result |= self._named("control", ins, [term.value for term in self._terms["control"]], names)
         result |= self._named("plant", plant_in, [term.value for term in self._terms["plant"]], plant_names)
+        if self.memory and not self.structure.differenced:
+            result |= function("rates", at, [seen.dz], at_names, ["dz"])
         if self.memory:
-            result |= {
-                **function("rates", ins, [seen.dz], names, ["dz"]),
-                **function("update", [*ins, self.h], [seen.ahead], [*names, "h"], ["z_next"]),
-            }
+            result |= function("update", [*at, self.h], [seen.ahead], [*at_names, "h"], ["z_next"])
+        if self.judges:
+            true = self._commanded
+            sigma_true = [true.sigma] if self.sliding else []
+            result |= function("judged", at, [true.error, *sigma_true], at_names, ["e", *sigma_names])
         if self.controller.law:
             for law in {**LAWS, self.structure.law: self.controller.law}.values():
                 with noted() as terms:
@@ -627,15 +671,20 @@ class System:
         y = ca.vertcat(*self._shown.values())
         seen = [commanded.command, commanded.error, commanded.sigma, commanded.wished, commanded.a_law]
         later = [commanded.dz, commanded.ahead]
+        judged = [self._commanded.error, self._commanded.sigma]  # of the state as it is, whatever the controller sees
         control_terms, plant_terms = ([term.value for term in self._terms[name]] for name in ("control", "plant"))
         if self.measured_base:
-            seen, later, control_terms = (without(values, self._still) for values in (seen, later, control_terms))
+            seen, later, control_terms, judged = (
+                without(values, self._still) for values in (seen, later, control_terms, judged)
+            )
         noise_in, noise_names = ([self.noise], ["noise"]) if self.noise.numel() else ([], [])
-        judged = seen[1:3]  # of the state as it is, whatever the controller sees
         if self.structure.effects:
             seen, later, control_terms = (ca.substitute(values, [x], [y]) for values in (seen, later, control_terms))
-            seen[1:3] = judged
+        seen[1:3] = judged
         sampling, sampling_names = [*ins, *noise_in], [*names, *noise_names]
+        updating, updating_names = [*sampling, self.h], [*sampling_names, "h"]
+        if self.structure.differenced:
+            sampling, sampling_names = updating, updating_names
         measured = [self._shown[item] for item in self._seen_through]
         measured_out, measured_names = ([ca.vertcat(*measured)], ["measured"]) if measured else ([], [])
         dx, *plant_terms = without([dx, *plant_terms], self._still)
@@ -669,11 +718,10 @@ class System:
         if self.tip is not None:
             at = ca.substitute(self.tip, w, self._signal_expressions)
             result |= function("loop_tip", [self.t, self.d, x], [at], ["t", "d", "x"], ["tip"])
+        if self.memory and not self.structure.differenced:
+            result |= function("loop_rates", sampling, later[:1], sampling_names, ["dz"])
         if self.memory:
-            result |= {
-                **function("loop_rates", sampling, later[:1], sampling_names, ["dz"]),
-                **function("loop_update", [*sampling, self.h], later[1:], [*sampling_names, "h"], ["z_next"]),
-            }
+            result |= function("loop_update", updating, later[1:], updating_names, ["z_next"])
         return result
 
     @property

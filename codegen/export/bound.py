@@ -134,7 +134,9 @@ class Export:
         """Hash of model, parameters and options: it changes if and only if the exported files may."""
         identity: dict[str, object] = {
             # A hash of what a structure does not have would be another one with each thing that it could have.
-            "structure": {k: v for k, v in asdict(self.system.structure).items() if v or k != "delay"},
+            "structure": {
+                k: v for k, v in asdict(self.system.structure).items() if v or k not in ("delay", "differenced")
+            },
             "parameters": {slot.key: value for slot, value in zip(self.slots, self.values, strict=True)},
             "tunable": [slot.key for slot in self.tunable_slots],
             "prefix": self.prefix,

@@ -81,9 +81,12 @@ class _Constant:
 
 
 class _Values(ValueGraph):
-    """Value graph of an export: references, measurements, base motion and commands come from outside."""
+    """Value graph of an export: references, measurements, base motion and commands come from outside.
 
-    def __init__(self, export: Export) -> None:
+    constants  inputs that are numbers, by name
+    """
+
+    def __init__(self, export: Export, constants: Mapping[str, float]) -> None:
         super().__init__()
         self._single = export.real == "float"
         self.tunable = tuple(slot.key for slot in export.tunable_slots)
@@ -97,6 +100,7 @@ class _Values(ValueGraph):
                 for i, (slot, value) in enumerate(zip(export.slots, export.values, strict=True))
             ],
         }
+        self._known |= {name: [self.constant(value)] for name, value in constants.items()}
         if not export.tables:
             self._known["d"] = [self.constant(0.0)] * export.system.d.numel()
 
@@ -202,14 +206,22 @@ class ScalarPrinter:
 
     functions  Functions of the System, each input named for what it is ("x", "q1d", …); p and d are the System's
     hoist      values that depend on parameters only are not computed by the functions but by `derive`
+    constants  inputs that are numbers, by name
     """
 
-    def __init__(self, export: Export, functions: Sequence[ca.Function], *, hoist: bool) -> None:
+    def __init__(
+        self,
+        export: Export,
+        functions: Sequence[ca.Function],
+        *,
+        hoist: bool,
+        constants: Mapping[str, float] | None = None,
+    ) -> None:
         self._export = export
         self._real: Real = export.real
         self._math = "slf" if export.real == "float" else "sl"
         self._hoist = hoist
-        self._graph = _Values(export)
+        self._graph = _Values(export, constants or {})
         beginning = {"t": [self._graph.constant(0.0)]}
         self._wanted = {
             function.name(): self._graph.apply(function, **(beginning if function.name() == "start" else {}))
@@ -249,10 +261,9 @@ class ScalarPrinter:
                 is_p = source == "p"
                 self._names[i] = self._export.tunable_slots[k].symbol if is_p else entries[source][k][0]
 
-    def join(self, name: str, function: ca.Function, **constants: float) -> None:
-        """Let Function `name` also compute the outputs of `function`, after its own; `constants` are inputs of it."""
-        given = {port: [self._graph.constant(value)] for port, value in constants.items()}
-        self._wanted[name] += self._graph.apply(function, **given)
+    def join(self, name: str, function: ca.Function) -> None:
+        """Let Function `name` also compute the outputs of `function`, after its own."""
+        self._wanted[name] += self._graph.apply(function)
         self._labels[name] += [label for port in self._export.outputs(function) for label in port.labels]
         self._name_inputs()
 

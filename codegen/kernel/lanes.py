@@ -233,6 +233,9 @@ class _Emitter:
         sampling = f"{now}, const sl_group *noise" if measured else now
         sample = control | ({"measured": measured} if measured else {}) | ({"ahead": memory} if memory else {})
         sampling += ", double period" if memory else ""
+        differenced = self.program.system.structure.differenced
+        sampled = measured or actuated or differenced  # whatever it is, it is of samples
+        times = "double step, " * actuated + "double period, " * differenced
         begun = [*outputs["start"][0], *map(self.graph.constant, self.program.system.z_start)]
         at_time = f"double time, const double *data, {_GIVEN}"
         at_row = f"double time, const double *data, const sl_group *x, {_GIVEN}, sl_group *tip"
@@ -245,7 +248,7 @@ class _Emitter:
 
         parts = [
             "/* ---- once per run ---- */\n",
-            self._staged("r", Binding.RUN, self._given, f"const sl_group *p, {'double step, ' * actuated}sl_group *r"),
+            self._staged("r", Binding.RUN, self._given, f"const sl_group *p, {times}sl_group *r"),
             self._function("start", f"{at_time}, sl_group *x", begun, Binding.STATE, into("x")),
             "/* ---- once per time: for all runs, then for each ---- */\n",
             self._staged(
@@ -273,7 +276,7 @@ class _Emitter:
         return "\n".join([
             *parts,
             "/* ---- at every evaluation, where a block does not hold ---- */\n",
-            *([] if measured or actuated else [self._complete("closed", now, {"dx": states + memory, **control})]),
+            *([] if sampled else [self._complete("closed", now, {"dx": states + memory, **control})]),
             self._complete("control", sampling, sample),
             self._complete("error", now, {"e": n, "sigma": n}),
             self._complete("plant", f"{now}, const sl_group *u", {"dx": states}),

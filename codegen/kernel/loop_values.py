@@ -40,7 +40,7 @@ class LoopValues:
         self.names = self._names()
         outputs = self.graph.outputs
         # Later functions are visited first: they decide which earlier values are kept.
-        dz, ahead = ([*outputs["rates"][0]], [*outputs["update"][0]]) if program.size("z") else ([], [])
+        dz, ahead = ([i for part in outputs.get(name, ()) for i in part] for name in ("rates", "update"))
         self.wanted = {
             "closed": [*outputs["closed"][0], *dz, *(i for part in outputs["control"] for i in part)],
             "control": [*(i for part in outputs["control"] for i in part), *ahead],

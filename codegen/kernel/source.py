@@ -64,6 +64,8 @@ def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes
     if program.size("commanded"):
         delay = program.system.structure.delay
         sensors += f"#define SL_ACTUATED 1\n#define SL_DELAY {delay}\n#define SL_NM {program.size('m')}\n"
+    if program.system.structure.differenced:
+        sensors += "#define SL_RUN_PERIOD , (double)job->hold * job->step\n"
     enum = ", ".join(f"{name} = {value}" for name, value in numbers.items())
     return f"""#define SL_W {width}
 #define SL_G {shape.groups}

@@ -83,6 +83,8 @@ class KernelSpec:
     def __post_init__(self) -> None:
         if not self.sampled and self.structure.delay:
             raise ValueError("a delay is of samples: expected a control that is sampled")
+        if not self.sampled and self.structure.differenced:
+            raise ValueError("differenced rates are of samples: expected a control that is sampled")
         if not self.sampled and (effects := [name for name in self.structure.effects if EFFECTS[name].sampled]):
             raise ValueError(f"effect {effects[0]!r} is one of samples: expected a control that is sampled")
         if self.tunable is None:

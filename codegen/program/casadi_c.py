@@ -67,7 +67,8 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
     measured, noisy = program.size("measured"), program.size("noise")
     noise = (f"{flat}noise",) if noisy else ()
     shown = ["(double *)measured"] if measured else []
-    control = call("control", w, s, *at, *noise, p, r, results=[*results, *shown])
+    differenced = program.system.structure.differenced
+    control = call("control", w, s, *at, *noise, *["&period"] * differenced, p, r, results=[*results, *shown])
     sampling, sampled, sample = state, computed, control
     if measured:
         sampling, sampled = state.replace("*x,", "*x, const sl_group *noise,"), f"{computed}, sl_group *measured"
@@ -76,15 +77,18 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
         before = "*noise," if measured else "*x,"
         sampling, sampled = sampling.replace(before, f"{before} double period,"), f"{sampled}, sl_group *ahead"
         update = call("update", w, s, *at, *noise, "&period", p, r, results=["(double *)ahead"])
+        sample = f"{control}\n{update}"
+    if "rates" in functions:
         rates = call("rates", w, s, *at, *noise, p, r, results=[f"(double *)(dx + {states})"])
-        sample, closed = f"{control}\n{update}", f"{control}\n{rates}"
+        closed = f"{control}\n{rates}"
     actuated, actuate = "actuate" in functions, ""
+    told = "double step, " * actuated + "double period, " * differenced
     if actuated:
         given = "double step, const sl_group *arrived, const sl_group *m, const sl_group *p, const sl_group *r"
         results = ["(double *)acting", "(double *)ahead"]
         body = call("actuate", f"{flat}arrived", f"{flat}m", "&step", p, results=results)
         actuate = f"static inline void kernel_actuate({given}, sl_group *acting, sl_group *ahead) {{\n{body}\n}}\n\n"
-    if not measured and not actuated:  # continuous control has no samples, and so nothing that is measured at them
+    if not (measured or actuated or differenced):  # continuous control has no samples, and so none of these
         closed = f"""static inline void kernel_closed({state}, sl_group *dx, {computed}) {{
 {closed}
   kernel_plant(now, x, (const sl_group *)u, p, r, dx);
@@ -103,7 +107,7 @@ enum {{ SL_NUMBER_W = {program.size("w")} }};
 #define CASADI_SYMBOL_EXPORT __attribute__((visibility("hidden")))
 #include "functions.c"
 
-static inline void kernel_run(const sl_group *p, {"double step, " * actuated}sl_group *r) {{
+static inline void kernel_run(const sl_group *p, {told}sl_group *r) {{
 {call("run", p, results=["(double *)r"])}
 }}
 

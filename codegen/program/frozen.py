@@ -18,6 +18,10 @@ anything but the state, control gives that too, as its last output)
 
     noise   standard normal numbers of the sample, one for each entry of x
 
+and where the controller makes out rates by itself, which is once a sample alone, so that there is no `rates`
+
+    h       s to the next sample, which control then takes too
+
 and where motors are not driven by the command as it is
 
     actuate(arrived, m, step, p) -> acting, m_next   (once a step: forces at its nodes, what motors remember)
@@ -91,14 +95,15 @@ def program(structure: Structure) -> Program:
     t, d, w, x, u, p = system.t, system.d, system.w, system.x, system.u, system.p
     z = [system.z] if system.memory else []
     noise = [system.noise] if system.noise.numel() else []
-    later = ("rates", "update") if z else ()
+    period = [system.h] if system.structure.differenced else []
+    later = [name for name in ("rates", "update") if f"loop_{name}" in system.functions]
     loop = {name: system.function(f"loop_{name}") for name in ("error", "control", "plant", *later)}
     sources = {"signals": system.function("signals"), "start": system.function("start"), **loop}
     inputs = {
         "signals": [t, d, p],
         "start": [t, d, p],
         "error": [w, x, *z, p],
-        "control": [w, x, *z, *noise, p],
+        "control": [w, x, *z, *noise, *period, p],
         "plant": [w, x, u, p],
         "rates": [w, x, *z, *noise, p],
         "update": [w, x, *z, *noise, system.h, p],
@@ -132,18 +137,18 @@ def program(structure: Structure) -> Program:
             "time": ([w, p, r], [time.values], ["w", "p", "r"], ["s"]),
             "error": ([*at, p, r], staged["error"], [*names_at, "p", "r"], ["e", "sigma"]),
             "control": (
-                [*sampling, p, r],
+                [*sampling, *period, p, r],
                 staged["control"],
-                [*names_sampling, "p", "r"],
+                [*names_sampling, *["h" for _ in period], "p", "r"],
                 ["u", "e", "sigma", "wished", "a_law", *measured],
             ),
             "plant": ([w, s, x, u, p, r], staged["plant"], ["w", "s", "x", "u", "p", "r"], ["dx"]),
         }
-        if z:
-            signature |= {
-                "rates": ([*sampling, p, r], staged["rates"], [*names_sampling, "p", "r"], ["dz"]),
-                "update": ([*sampling, system.h, p, r], staged["update"], [*names_sampling, "h", "p", "r"], ["z_next"]),
-            }
+        if "rates" in later:
+            signature["rates"] = ([*sampling, p, r], staged["rates"], [*names_sampling, "p", "r"], ["dz"])
+        if "update" in later:
+            updating = [*sampling, system.h, p, r]
+            signature["update"] = (updating, staged["update"], [*names_sampling, "h", "p", "r"], ["z_next"])
         observed = {"tip": system.function("loop_tip")} if system.tip is not None else {}
         observed |= {"actuate": system.function("loop_actuate")} if system.commanded else {}
         functions = {

@@ -209,15 +209,19 @@ class LoopGraph(ValueGraph):
         [s] = self.add("time", functions["time"], [w, p, r])
         self.add("error", functions["error"], [w, s, x, *z, p, r])
         at = [w, s, x, *z]
-        [command, *_] = self.add("control", functions["control"], [*at, *noise, p, r])
+        # The filter of differenced rates is of the period and of parameters, which a run has once.
+        period = [[self.leaf("h", 0, Binding.RUN)]] if program.system.structure.differenced else []
+        [command, *_] = self.add("control", functions["control"], [*at, *noise, *period, p, r])
         self.add("plant", functions["plant"], [w, s, x, u, p, r])
         self.add("closed", functions["plant"], [w, s, x, command, p, r])
-        if z:
+        if "rates" in functions:
             self.add("rates", functions["rates"], [*at, *noise, p, r])
-            self.add("update", functions["update"], [*at, *noise, [self.leaf("h", 0, Binding.STATE)], p, r])
+        if "update" in functions:
+            [h] = period or [[self.leaf("h", 0, Binding.STATE)]]
+            self.add("update", functions["update"], [*at, *noise, h, p, r])
         system = program.system
         self.labels = {
-            "control": self._labelled(system, "control", [w, x, *z, *noise, p]),
+            "control": self._labelled(system, "control", [w, x, *z, *noise, *period, p]),
             "plant": self._labelled(system, "plant", [w, x, u, p]),
             "closed": self._labelled(system, "plant", [w, x, command, p]),
         }

@@ -47,6 +47,9 @@
 #define SL_ACTING_AT(node) pack->acting[node]
 #define SL_ACTING_GIVEN , pack->acting + chosen->instant
 #endif
+#ifndef SL_RUN_PERIOD /* what kernel_run is told of the sample period, where it has a use for it */
+#define SL_RUN_PERIOD
+#endif
 #if SL_NMEASURED > 0
 #define SL_NOISE_GIVEN (const sl_group *)pack->noise,
 #define SL_MEASURED_TAKEN , pack->measured
@@ -489,9 +492,9 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
   memset(pack->command, 0, sizeof pack->command);
   memset(pack->line, 0, sizeof pack->line);
   memset(pack->m, 0, sizeof pack->m);
-  kernel_run((const sl_group *)pack->p, job->step, pack->r);
+  kernel_run((const sl_group *)pack->p, job->step SL_RUN_PERIOD, pack->r);
 #else
-  kernel_run((const sl_group *)pack->p, pack->r);
+  kernel_run((const sl_group *)pack->p SL_RUN_PERIOD, pack->r);
 #endif
   sl_table_data(job->tables, SL_NTABLES, job->start_time, d, 1);
   kernel_start(job->start_time, d, (const sl_group *)pack->p, (const sl_group *)pack->r, pack->x);

@@ -7,6 +7,9 @@ from .controller import Control as Control
 from .controller import ControlSignals as ControlSignals
 from .controller import Controller as Controller
 from .controller import commanded as commanded
+from .differencing import VELOCITY_CUTOFF as VELOCITY_CUTOFF
+from .differencing import differenced as differenced
+from .differencing import differencing_states as differencing_states
 from .disturbance_observers import OBSERVERS as OBSERVERS
 from .observer import INPUT as INPUT
 from .observer import Observer as Observer

@@ -9,7 +9,7 @@ from .locate import scenarios_folder as scenarios_folder
 from .numeric_keys import NumericKey as NumericKey
 from .scenario import Scenario as Scenario
 from .scenario import Slots as Slots
-from .scenario import absent_at_zero as absent_at_zero
+from .scenario import absent_at as absent_at
 from .scenario import draft_scenario as draft_scenario
 from .scenario import expect_scenario as expect_scenario
 from .scenario import load_scenario as load_scenario

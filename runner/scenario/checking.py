@@ -94,6 +94,7 @@ def resolve(
     problems += _via_point_problems(document["reference"], where)
     problems += _exponent_problems(document["control"], where)
     problems += _sampling_problems(document, given["control"], where)
+    problems += _velocity_problems(document["sensor"], given["sensor"], where)
     problems += _hardware_problems(document, where)
     problems += _delay_problems(document, where)
     problems += _whole_problems(document, "simulation.duration", where)
@@ -293,6 +294,20 @@ def _sampling_problems(document: Document, given: Mapping[str, object], where: s
     return _whole_problems(document, key, where)
 
 
+def _velocity_problems(sensor: dict[str, Any], given: Mapping[str, object], where: str) -> list[Problem]:
+    """Rates of a sensor may have noise, differences a cutoff; `sensor` keeps what counts."""
+    velocity = sensor.get("velocity")
+    if velocity not in schema.NOT_WITH_VELOCITY:
+        return []
+    name = schema.NOT_WITH_VELOCITY[velocity]
+    sensor.pop(name, None)
+    if name not in given:
+        return []
+    [other] = (item for item in schema.NOT_WITH_VELOCITY if item != velocity)
+    text = f'only goes with sensor.velocity = "{other}"'
+    return [Problem(where, f"sensor.{name}", text, f'velocity = "{velocity}"')]
+
+
 def _hardware_problems(document: Document, where: str) -> list[Problem]:
     """What sensors show, and when commands arrive, is of samples, which a continuous control has none of."""
     control = document["control"]
@@ -304,6 +319,7 @@ def _hardware_problems(document: Document, where: str) -> list[Problem]:
         if any(value != effect.absent for value in document[effect.table].get(effect.name, ()))
     ]
     there += ["actuator.delay"] if document["actuator"].get("delay") else []
+    there += ["sensor.velocity"] if document["sensor"].get("velocity") == "differenced" else []
     text = 'only goes with control.mode = "sampled"'
     return [Problem(where, key, text, 'mode = "continuous"') for key in there]
 

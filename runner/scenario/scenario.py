@@ -197,9 +197,10 @@ class Scenario:
             effects=tuple(
                 effect.name
                 for effect in (*SENSORS, *ACTUATORS)
-                if any(value != effect.absent for value in self.document[effect.table][effect.name])
+                if any(value != effect.absent for value in self.document[effect.table].get(effect.name, ()))
             ),
             delay=round(self.document["actuator"]["delay"] / self.step),
+            differenced=self.document["sensor"]["velocity"] == "differenced",
         )
 
     def _has(self, name: str) -> bool:
@@ -331,15 +332,15 @@ class Scenario:
     # Changed and written
 
     def including(self, values: Mapping[str, ArrayLike]) -> Scenario:
-        """This scenario, with damping, friction and effects of sensors that `values` (key -> numbers) have beyond zero.
+        """This scenario, with damping, friction, and effects of sensors and motors that `values` (key -> numbers) have.
 
-        What is zero is no number of the structure, and so none that could vary: it becomes the largest of its numbers.
-        Raises InputError.
+        What is zero, or a limit at infinity, is no number of the structure, and so none that could vary: it becomes the
+        largest finite of its numbers. Raises InputError.
         """
         present = (*self.structure().friction, *self.structure().effects)
         added: dict[str, float] = {}
         for key, numbers in values.items():
-            if absent_at_zero(key) and key.split(".")[1] not in present:
+            if absent_at(key) is not None and key.split(".")[1] not in present:
                 try:
                     column = np.ravel(doubles(numbers))
                 except (TypeError, ValueError):  # `columns_for` says what is wrong
@@ -486,6 +487,9 @@ class Scenario:
                 document[table] = {"kind": kind} | stays
         if overrides.get("control.mode") == "continuous":
             document["control"].pop("period", None)
+        velocity = overrides.get("sensor.velocity")
+        if isinstance(velocity, str):
+            document["sensor"].pop(schema.NOT_WITH_VELOCITY.get(velocity, ""), None)
         for name, registry in (("controller", CONTROLLERS), ("law", LAWS), ("observer", OBSERVERS)):
             old = document["control"][name]
             if overrides.get(f"control.{name}", old) != old:
@@ -673,12 +677,15 @@ def weighs(key: str) -> bool:
     return key.partition(".")[0] in _ARM
 
 
-def absent_at_zero(key: str) -> bool:
-    """Whether a dotted key is damping, friction or of a sensor: a structure has it only where it is not zero."""
+def absent_at(key: str) -> float | None:
+    """The number of a dotted key at which a structure does not have what it is of, None for what is always there.
+
+    0 for damping, friction and most effects of sensors and motors, infinity for a limit.
+    """
     table, _, rest = key.partition(".")
     name, _, place = rest.partition(".")
     if place and not place.isdecimal():
-        return False
+        return None
     if table in ("sensor", "actuator"):
-        return name in EFFECTS and EFFECTS[name].table == table and EFFECTS[name].absent == 0.0
-    return table in ("drive", "plant") and name in {item.name for item in FRICTION}
+        return EFFECTS[name].absent if name in EFFECTS and EFFECTS[name].table == table else None
+    return 0.0 if table in ("drive", "plant") and name in {item.name for item in FRICTION} else None

@@ -18,7 +18,15 @@ from springline.codegen.kernel import LARGEST_SEED, MOST_STEPS
 from springline.codegen.numbers import double
 from springline.model.base import COORDINATES, MOUNT, MOUNT_RPY
 from springline.model.base_motion import MOTIONS
-from springline.model.control import CONTROLLERS, INPUT, LARGEST_SURFACE_EXPONENT, LAWS, OBSERVERS, LogForm
+from springline.model.control import (
+    CONTROLLERS,
+    INPUT,
+    LARGEST_SURFACE_EXPONENT,
+    LAWS,
+    OBSERVERS,
+    VELOCITY_CUTOFF,
+    LogForm,
+)
 from springline.model.drive import DRIVES, EPSILON, DriveKind, friction_parameters
 from springline.model.hardware import ACTUATORS, SENSORS
 from springline.model.integrators import INTEGRATORS
@@ -38,6 +46,9 @@ SIZE = "n"
 """The key of [mechanism] for the number of joints of a mechanism that comes in several sizes."""
 
 MOTOR_STARTS = ("unloaded", "equilibrium")
+
+NOT_WITH_VELOCITY = {"measured": "velocity_cutoff", "differenced": "velocity_noise"}
+"""Where the controller has rates from, the default first -> the key of [sensor] that says nothing then."""
 
 _DEFAULT = Structure()
 
@@ -446,9 +457,11 @@ def schema(
 
 
 def _sensor(joints: Sequence[Joint]) -> dict[str, Any]:
-    """[sensor]: what sensors do to what they show, and what their noise goes by."""
+    """[sensor]: what sensors do to what they show, what their noise goes by, and where rates come from."""
     return {
         **_numbers([item for effect in SENSORS for item in effect.parameters], joints),
+        "velocity": (Annotated[str, choice("velocity", NOT_WITH_VELOCITY)], next(iter(NOT_WITH_VELOCITY))),
+        **_numbers([VELOCITY_CUTOFF], joints),
         "seed": (Annotated[int, count(LARGEST_SEED)], 0),
         "run": (Annotated[int, count(MOST_STEPS)], 0),
     }

@@ -13,7 +13,7 @@ from springline.codegen.memory import memory
 from springline.runner.files import InputError, Problem
 from springline.runner.run import field as unit_field
 from springline.runner.run import metrics_schema, metrics_table, results
-from springline.runner.scenario import Scenario, absent_at_zero, expect_keys, expect_scenario
+from springline.runner.scenario import Scenario, absent_at, expect_keys, expect_scenario
 from springline.runner.sweep.forecast import COPIES
 from springline.runner.sweep.pool import open_pool
 from springline.runner.sweep.work import Work, work_for
@@ -40,7 +40,7 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
         raise TypeError(f"jobs is {jobs!r}, expected a whole number or None")
     if jobs is not None and jobs < 1:
         raise ValueError(f"jobs is {jobs}, expected at least 1")
-    scenario = scenario.including({key: values for key, values in columns.items() if absent_at_zero(key)})
+    scenario = scenario.including({key: values for key, values in columns.items() if absent_at(key) is not None})
     arrays = scenario.columns_for(columns)
     lengths = {key: len(values) for key, values in arrays.items()}
     if len(set(lengths.values())) != 1 or 0 in lengths.values():

@@ -27,7 +27,7 @@ from springline.runner.scenario import (
     Record,
     Scenario,
     UserClass,
-    absent_at_zero,
+    absent_at,
     canonical_reference,
     given_text,
     names_file,
@@ -446,8 +446,11 @@ class Plan:
 
 
 def _switches(key: str, numbers: tuple[float, ...]) -> bool:
-    """Whether a key takes something out of the structure in some runs and not in others."""
-    return absent_at_zero(key) and 0.0 in numbers and any(numbers)
+    """Whether a key takes something out of the structure in some runs and not in others.
+
+    A limit at infinity stays in, for then it changes no bit.
+    """
+    return absent_at(key) == 0.0 and 0.0 in numbers and any(numbers)
 
 
 def _takes_out_a_mount(axis: Axis, sweep: Sweep) -> bool:

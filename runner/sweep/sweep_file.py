@@ -37,7 +37,7 @@ from springline.codegen.nearest import nearest
 from springline.runner.files import InputError, Problem, read_toml, unknown
 from springline.runner.scenario import (
     Scenario,
-    absent_at_zero,
+    absent_at,
     draft_scenario,
     given_text,
     load_scenario,
@@ -119,7 +119,7 @@ class _Reader:
         samples = self._samples(document, cast(Method, method), axes)
         if self._problems or scenario is None:
             raise InputError(*self._problems)
-        reached = {axis.key: axis.reach(axes) for axis in axes if absent_at_zero(axis.key)}
+        reached = {axis.key: axis.reach(axes) for axis in axes if absent_at(axis.key) is not None}
         scenario = scenario.including({key: numbers for key, numbers in reached.items() if 0.0 not in numbers})
         return Sweep(self._name, scenario, cast(Method, method), samples, seed, chunk, keep, tuple(axes))
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from springline.runner import InputError, batch, load_scenario, simulate
+from springline.runner.sweep import Plan, load_sweep
 
 SAMPLED = {"control.mode": "sampled", "control.period": 1e-3, "simulation.duration": 0.02}
 SLOW = SAMPLED | {"actuator.delay": 5e-4, "actuator.lag": [0.0, 2e-4], "actuator.rate_limit": 1e7}
@@ -34,6 +35,38 @@ def test_a_batch_varies_what_motors_do() -> None:
     for k, lag in enumerate(lags):
         alone = simulate(scenario.with_overrides({"actuator.lag": lag}))
         assert alone.metrics["rms_error_lift"][0].as_py() == table["rms_error_lift"][k].as_py()
+
+
+def test_limits_vary_from_none_in_a_scenario_that_has_none(tmp_path: Path) -> None:
+    """In a batch and in a sweep: infinity among them changes no bit; lags and sensors vary from zero."""
+    scenario = load_scenario("paper/nominal", SAMPLED | {"drive.kind": "rigid"})
+    rates = np.array([np.inf, 1e5, 1e6])
+    table = batch(scenario, {"actuator.rate_limit": rates})
+    found = table["rms_error_lift"].to_pylist()
+    assert len(set(found)) == 3
+    for k, rate in enumerate(rates):
+        alone = simulate(scenario.with_overrides({"actuator.rate_limit": rate}))
+        assert alone.metrics["rms_error_lift"][0].as_py() == found[k]
+    (tmp_path / "limits.toml").write_text("""
+        scenario = "paper/nominal"
+        method = "grid"
+        [set]
+        "control.mode" = "sampled"
+        "control.period" = 1e-3
+        "drive.kind" = "rigid"
+        "simulation.duration" = 0.02
+        [vary]
+        "actuator.rate_limit.1" = { values = [inf, 1e5] }
+        "actuator.lag" = { values = [0.0, 1e-4] }
+        "sensor.position_resolution" = { values = [0.0, 1e-4] }
+    """)
+    sweep = load_sweep(tmp_path / "limits.toml")
+    assert {group.work.system.structure.effects for group in Plan(sweep).groups} == {
+        ("rate_limit",),
+        ("rate_limit", "lag"),
+        ("position_resolution", "rate_limit"),
+        ("position_resolution", "rate_limit", "lag"),
+    }
 
 
 @pytest.mark.parametrize(

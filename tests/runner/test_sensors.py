@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pyarrow import parquet
+from typer.testing import CliRunner
 
 from springline.runner import InputError, batch, load_scenario, simulate
+from springline.runner.cli import app
+from springline.runner.sweep import read_dataset
 
 SAMPLED = {"control.mode": "sampled", "control.period": 1e-3, "simulation.duration": 0.02}
+DIFFERENCED = SAMPLED | {"sensor.velocity": "differenced", "sensor.velocity_cutoff": [500.0, math.inf]}
 NOISY = SAMPLED | {"sensor.position_noise": 1e-4, "sensor.velocity_noise": [1e-3, 2e-3], "sensor.seed": 42}
 
 
@@ -52,6 +59,15 @@ def test_columns_of_what_is_measured_stand_beside_the_state() -> None:
         (SAMPLED | {"sensor.seed": 1.5}, "sensor.seed: expected an integer"),
         (SAMPLED | {"sensor.run": -1}, "sensor.run: expected an integer"),
         (SAMPLED | {"sensor.noise": 1.0}, "sensor.noise: unknown key"),
+        (
+            {"control.mode": "continuous", "sensor.velocity": "differenced"},
+            'sensor.velocity: only goes with control.mode = "sampled"',
+        ),
+        (SAMPLED | {"sensor.velocity": "difference"}, "did you mean 'differenced'?"),
+        (DIFFERENCED | {"sensor.velocity_cutoff": 0.0}, "sensor.velocity_cutoff: expected a number > 0"),
+        (DIFFERENCED | {"sensor.velocity_cutoff": -1.0}, "sensor.velocity_cutoff: expected a number > 0"),
+        (SAMPLED | {"sensor.velocity_cutoff": 300.0}, 'cutoff: only goes with sensor.velocity = "differenced"'),
+        (DIFFERENCED | {"sensor.velocity_noise": 1.0}, 'velocity_noise: only goes with sensor.velocity = "measured"'),
     ],
 )
 def test_wrong_sensors_are_refused(changes: dict[str, object], told: str) -> None:
@@ -79,3 +95,66 @@ def test_a_sweep_over_noise_groups_what_has_none() -> None:
     levels = np.array([1e-4, 2e-4, 1e-3])
     table = batch(scenario, {"sensor.position_noise": levels})
     assert len(set(table["rms_error_lift"].to_pylist())) == 3
+
+
+def test_replay_has_the_noise_of_its_run(tmp_path: Path) -> None:
+    """From a dataset, whose runs count through its groups, and as a scenario with the run's number."""
+    base = SAMPLED | {
+        "drive.kind": "rigid",
+        "sensor.velocity": "differenced",
+        "sensor.position_resolution": 1e-5,
+        "sensor.seed": 42,
+    }
+    (tmp_path / "noisy.toml").write_text(f"""
+        scenario = "paper/nominal"
+        method = "grid"
+        [set]
+        {"".join(f"{key!r} = {json.dumps(value)}" + chr(10) for key, value in base.items())}
+        [vary]
+        "control.k1" = {{ each = [1.0, 2.0] }}
+        "sensor.position_noise" = {{ values = [1e-5, 1.0000000001e-5] }}
+    """)
+    folder, again = tmp_path / "data", tmp_path / "again"
+    invoked = CliRunner().invoke
+    done = invoked(app, ["batch", str(tmp_path / "noisy.toml"), "-o", str(folder), "--no-plot", "--jobs", "1"])
+    assert done.exit_code == 0, done.output
+    rows, seen = {row["run"]: row for row in read_dataset(folder).to_pylist()}, set()
+    for run in (0, 3):
+        done = invoked(app, ["replay", str(folder), str(run), "-o", str(again), "--no-plot", "--force"])
+        assert done.exit_code == 0 and "bit for bit" in done.stdout, done.output
+        own = {key: rows[run][key] for key in ("sensor.position_noise", "control.k1")}
+        alone = simulate(load_scenario("paper/nominal", base | own | {"sensor.run": run}))
+        replayed = parquet.read_table(again / "trajectory.parquet")
+        assert replayed.equals(alone.trajectory)
+        metrics = {name: alone.metrics[name][0].as_py() for name in ("rms_error_lift", "U_rms_rotation")}
+        assert metrics == {name: rows[run][name] for name in metrics}
+        seen.add(replayed["q1_measured_lift"].to_numpy().tobytes())
+    assert len(seen) == 2
+
+
+def test_a_noisy_encoder_is_followed_and_a_filter_calms_it(tmp_path: Path) -> None:
+    """Steps of a 17-bit turn and of 20 micrometres: settled as with ideal sensors, at rest within a few steps."""
+    ideal = SAMPLED | {"drive.kind": "rigid", "simulation.duration": 1.0, "simulation.output_every": 1000}
+    steps = {"sensor.position_resolution": [2e-5, 4.8e-5], "sensor.position_noise": 1e-5}
+    rough = ideal | steps | {"sensor.velocity": "differenced"}
+    scenario = load_scenario("paper/nominal", rough | {"sensor.velocity_cutoff": [1000.0, 500.0]})
+    path = tmp_path / "again.toml"
+    path.write_text(scenario.to_toml(tmp_path))
+    assert load_scenario(path) == scenario
+    runs = [simulate(load_scenario("paper/nominal", changes)) for changes in (ideal, rough)]
+    [sound], [unfiltered], [filtered] = (run.metrics.to_pylist() for run in (*runs, simulate(scenario)))
+    for found in (unfiltered, filtered):
+        assert found["settling_time_lift"] == pytest.approx(sound["settling_time_lift"], rel=0.02)
+        assert found["steady_state_error_lift"] < 1e-3
+    for joint in ("lift", "rotation"):
+        assert sound[f"chatter_{joint}"] < filtered[f"chatter_{joint}"] < 0.8 * unfiltered[f"chatter_{joint}"]
+
+
+def test_rates_are_measured_or_differenced_and_keep_what_goes_with_it() -> None:
+    differenced = load_scenario("paper/nominal", DIFFERENCED)
+    assert differenced.structure().differenced and "velocity_noise" not in differenced.document["sensor"]
+    measured = differenced.with_overrides({"sensor.velocity": "measured", "sensor.velocity_noise": 1e-3})
+    assert not measured.structure().differenced and "velocity_cutoff" not in measured.document["sensor"]
+    again = measured.with_overrides({"sensor.velocity": "differenced"})
+    assert again.value_of("sensor.velocity_cutoff.0") == math.inf
+    assert "velocity_noise" not in again.document["sensor"]

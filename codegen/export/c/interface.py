@@ -44,24 +44,29 @@ class JointLimits:
 class TypedInterface:
     """Structures and function bodies of an export's C interface.
 
-    tip  where the arm's end is and how fast it moves, into tip[0], tip[1], …; None unless asked for, or without one
+    tip     where the arm's end is and how fast it moves, into tip[0], tip[1], …; None unless asked for, or without one
+    judged  error and sliding variable of the state as it is, into judged[0], judged[1], …; None unless asked for, or
+            where the controller sees no others
     """
 
-    def __init__(self, export: Export, *, with_tip: bool = False) -> None:
+    def __init__(self, export: Export, *, with_tip: bool = False, with_judged: bool = False) -> None:
         self.export = export
         system = export.system
         names = ["measure", "control", "plant", "start", "signals"]
         shows_tip = with_tip and system.tip is not None
         names += ["tip"] if shows_tip else []
         names += ["loop_actuate"] if system.commanded else []
-        remembers = bool(system.memory)
-        names += ["rates"] if remembers else []
-        self._printer = ScalarPrinter(export, [system.function(name) for name in names], hoist=True)
+        remembers, integrates = bool(system.memory), "rates" in system.functions
+        names += ["rates"] if integrates else []
+        shows_judged = with_judged and system.judges
+        names += ["judged"] if shows_judged else []
+        functions, constants = [system.function(name) for name in names], {"h": export.period} if remembers else {}
+        self._printer = ScalarPrinter(export, functions, hoist=True, constants=constants)
         if remembers:
-            self._printer.join("control", system.function("update"), h=export.period)
+            self._printer.join("control", system.function("update"))
         if system.controller.law:
             self._printer.compose("control", "sigma", system.function(f"law_{system.controller.law.name}"), "dsigma")
-        read = self._printer.reads("control") | (self._printer.reads("rates") if remembers else frozenset())
+        read = self._printer.reads("control") | (self._printer.reads("rates") if integrates else frozenset())
 
         def declared(*quantities: Quantity, integer: bool = False) -> tuple[Field, ...]:
             found = entries(quantities, system.joints)
@@ -126,9 +131,12 @@ class TypedInterface:
         targets = [f"tip[{k}]" for k in range(len(system.observed))]
         load = self._load(around, x_is_array=True)
         self.tip: Body | None = self._printer.body("tip", load, targets) if shows_tip else None
+        targets = [f"judged[{k}]" for k in range((1 + len(system.sliding)) * system.n)]
+        load = self._load(seeing | {"x": "state->"})
+        self.judged: Body | None = self._printer.body("judged", load, targets) if shows_judged else None
         self.rates: Body | None = None
         """Rates of the controller's states, into dz[0], dz[1], …: for those that integrate them with the plant."""
-        if remembers:
+        if integrates:
             targets = [f"dz[{k}]" for k in range(len(system.memory))]
             self.rates = self._printer.body("rates", self._load(seeing), targets)
 

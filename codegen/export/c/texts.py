@@ -77,6 +77,7 @@ def _values(export: Export, interface: TypedInterface) -> dict[str, Any]:
         "motors": interface.structures.get("motors", ()),
         "joints_count": system.n,
         "sensed": bool(system.measured),
+        "differenced": system.structure.differenced,
         "noise_blocks": -(-system.noise.numel() // 4),
         "seed": export.seed,
         "run": export.run,
@@ -140,9 +141,11 @@ def _self_check(export: Export, interface: TypedInterface) -> dict[str, Any]:
     first = len(structures["reference"])  # of what is measured, behind the reference
     fed = [f"in + {k}" for k in range(3 * n, first, system.base.b.numel())]
     z = [f"in + {first + len(measured)}"] if memory else []
+    z += ["&period"] if system.structure.differenced else []
     return {
         "bits": 32 if export.real == "float" else 64,
         "plant_time_step": literal(TIME_STEP, export.real),
+        "sample_period": literal(export.period, export.real),
         "control_outputs": outputs,
         "control_in": places(reference="reference->", measurement="measurement->"),
         "control_out": [

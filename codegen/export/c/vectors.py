@@ -171,9 +171,10 @@ def _control_rows(interface: TypedInterface, model: _Model) -> Numbers:
     before, after = z[:-1], z[1:]
     fed = np.split(base, 3, axis=1) if base.size else []
     seen = [*np.split(reference, 3, axis=1), *fed, x, *([before] if system.memory else [])]
+    period = [np.array([interface.export.period])]
     if system.memory:
-        model("update", *seen, np.array([interface.export.period]), into=[after])
-    outputs = model("control", *seen)
+        model("update", *seen, *period, into=[after])
+    outputs = model("control", *seen, *(period if system.structure.differenced else []))
     names = {field.name for field in interface.structures["measurement"]}
     measured = [k for k, field in enumerate(interface.structures["state"]) if field.name in names]
     flags = _limits_met(interface.export, model, outputs)

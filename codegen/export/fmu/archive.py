@@ -67,6 +67,8 @@ def fmu(
     system = system_of(structure)
     if (system.measured or system.commanded) and settings.period == 0.0:
         raise ValueError("sensors and motors go by samples: expected a period, 0 is for continuous control")
+    if system.structure.differenced and settings.period == 0.0:
+        raise ValueError("differenced rates go by samples: expected a period, 0 is for continuous control")
     if len(tables) != len(system.tables):
         raise ValueError(f"{len(tables)} tables given, the system has {len(system.tables)}")
     wanted = bind(structure, values, tunable=tunable).tunable
@@ -82,7 +84,7 @@ def fmu(
         seed=settings.seed,
         run=settings.run,
     )
-    typed = TypedInterface(export, with_tip=part != "controller")
+    typed = TypedInterface(export, with_tip=part != "controller", with_judged=part == "loop")
     shown = interface(export, typed, part, sampled=part == "controller" or settings.period > 0.0)
     code = sources(export, typed, shown, settings, version)
     describe = partial(

@@ -82,6 +82,7 @@ def _values(export: Export, typed: TypedInterface, interface: Interface, setting
         "force_is_input": force_is_input(system, part),
         "tip": typed.tip,
         "sensed": part != "controller" and bool(system.measured),
+        "judged": typed.judged,
         "noisy": bool(system.noise.numel()),
         "driven": part != "controller" and bool(system.commanded),
         "motors": typed.structures.get("motors", ()) if part != "controller" else (),

@@ -144,7 +144,7 @@ def structures_of(typed: TypedInterface) -> dict[str, tuple[Field, ...]]:
 
 def part_parameters(system: System, part: Part) -> tuple[int, ...]:
     """Indices of the slots that a part depends on, ascending."""
-    names = ("control", "rates", "update") if system.memory else ("control",)
+    names = [name for name in ("control", "rates", "update") if name in system.functions]
     control = {i for name in names for i in _read(system, name)}
     if part == "controller":
         return tuple(sorted(control))
