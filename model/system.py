@@ -634,7 +634,9 @@ class System:
         judged = seen[1:3]  # of the state as it is, whatever the controller sees
         if self.structure.effects:
             with as_written():  # the operations that the controller does to what it is shown
-                seen, later, control_terms = (ca.substitute(values, [x], [y]) for values in (seen, later, control_terms))
+                seen, later, control_terms = (
+                    ca.substitute(values, [x], [y]) for values in (seen, later, control_terms)
+                )
             seen[1:3] = judged
         sampling, sampling_names = [*ins, *noise_in], [*names, *noise_names]
         measured = [self._shown[item] for item in self._seen_through]

@@ -486,7 +486,9 @@ class Plan:
     def _work(self, scenario: Scenario) -> Work:
         """The Work of a group: which slots its keys move is seen by moving them, one axis at a time."""
         valid = scenario.numeric_keys()
-        numeric = [axis.key for axis in self.sweep.axes if axis.key in self._numeric and self._counts(axis.key, scenario)]
+        numeric = [
+            axis.key for axis in self.sweep.axes if axis.key in self._numeric and self._counts(axis.key, scenario)
+        ]
         missing = [key for key in numeric if key not in valid]
         if missing:
             kind, source = "numeric key of a group", self.sweep.source

@@ -160,9 +160,7 @@ class _Reader:
         self._problems += [unknown(self._name, f"keep.{key}", "key", key, ["trajectories"]) for key in wrong]
         return self._whole(table, "trajectories", 0, 1, MOST_RUNS, "keep.trajectories")
 
-    def _scenario(
-        self, document: Mapping[str, Any], axes: Sequence[Axis]
-    ) -> tuple[Scenario | None, dict[str, object]]:
+    def _scenario(self, document: Mapping[str, Any], axes: Sequence[Axis]) -> tuple[Scenario | None, dict[str, object]]:
         """The scenario with its overrides, and those that are held back: of tables that only runs of the sweep have."""
         source = document.get("scenario", "paper/nominal")
         overrides = document.get("set", {})

@@ -46,7 +46,7 @@ _BINARY = {
     "less": ca.fmin,
     "angle": lambda x, y: ca.atan2(x, 1 + y**2),
     "length": ca.hypot,
-    "signed": lambda x, y: ca.copysign(x, y),
+    "signed": ca.copysign,
     "chosen": lambda x, y: ca.if_else(x < y, x, -y),
     "both": lambda x, y: ca.if_else(ca.logic_or(ca.logic_and(x > 0, y > 0), ca.logic_not(x != y)), x - y, y),
 }
@@ -192,7 +192,9 @@ def loops(draw: st.DrawFn, controllers: tuple[str, ...] = (OWN, *CONTROLLERS), h
     """hardware: with sensors, actuators and a delay, which go with sampled control."""
     controller = draw(st.sampled_from(controllers))
     recipe = draw(recipes()) if controller == OWN else None
-    mechanism, size = draw(st.sampled_from([("planar_arm", 2), ("transfer_manipulator", 0), ("planar_arm", 1), ("planar_arm", 3)]))
+    mechanism, size = draw(
+        st.sampled_from([("planar_arm", 2), ("transfer_manipulator", 0), ("planar_arm", 1), ("planar_arm", 3)])
+    )
     n = len(MECHANISMS[mechanism].of_size(size).joints)
     drive = draw(st.sampled_from(["elastic", "rigid"]))
     frictions = [item.name for item in FRICTION if drive == "elastic" or item.name.startswith("link")]
@@ -275,4 +277,3 @@ def numbers_of(structure: Structure, seed: int) -> np.ndarray:
 def columns(structure: Structure) -> list[str]:
     """Names of a trajectory's columns."""
     return [entry.name for entry in System(structure).trajectory]
-

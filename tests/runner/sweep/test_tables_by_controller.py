@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pyarrow.parquet as parquet
 import pytest
+from pyarrow import parquet
 from typer.testing import CliRunner
 
 from springline.runner.cli import app
@@ -124,7 +124,8 @@ class Servo(Controller):
 
 def test_of_a_controller_of_a_user_s_file(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(OWN)
-    text = 'control.servo.stiffness = 700.0\n[vary]\ncontrol.controller = { values = ["computed_torque", "own.py:Servo"] }\n'
+    text = "control.servo.stiffness = 700.0\n[vary]\n"
+    text += 'control.controller = { values = ["computed_torque", "own.py:Servo"] }\n'
     file, out = written(tmp_path, text + "plant.m3.scale = { values = [1.0, 1.1] }\n"), tmp_path / "out"
     command("batch", file, "-o", out, "--jobs", 1, "--no-plot", "--set", "control.servo.stiffness=800")
     plan = stored_plan(Dataset(place(str(out))), [tmp_path / "own.py"])
@@ -139,7 +140,7 @@ def test_of_a_controller_of_a_user_s_file(tmp_path: Path) -> None:
         (f"control.super_twisting.slope = -20.0\n[vary]\n{RIVALS}", "set.control.super_twisting.slope"),
         (f"control.nonsingular_terminal.gain = 20.0\n[vary]\n{RIVALS}", "control.nonsingular_terminal"),
         (f"[vary]\n{RIVALS}control.super_twisting.slop = {{ values = [20.0] }}\n", "vary.control.super_twisting.slop"),
-        (f"[vary]\n{RIVALS}control.super_twisting.slop = {{ uniform = [1.0, 2.0], points = 3 }}\n", "super_twisting.slope"),
+        (f"[vary]\n{RIVALS}control.super_twisting.slop = {{ uniform = [1, 2], points = 3 }}\n", "twisting.slope"),
         (f"[vary]\n{RIVALS}control.nonsingular_terminal.gain = {{ values = [20.0] }}\n", "nonsingular_terminal"),
     ],
 )  # fmt: skip
