@@ -19,7 +19,16 @@ from springline.codegen.nearest import nearest
 from springline.codegen.numbers import double
 from springline.model.base import COORDINATES, MOUNT, MOUNT_RPY
 from springline.model.base_motion import MOTIONS
-from springline.model.control import CONTROLLERS, INPUT, LARGEST_SURFACE_EXPONENT, LAWS, OBSERVERS, LogForm
+from springline.model.control import (
+    CONTROLLERS,
+    INPUT,
+    LARGEST_SURFACE_EXPONENT,
+    LAWS,
+    OBSERVERS,
+    Controller,
+    LogForm,
+    Observer,
+)
 from springline.model.drive import DRIVES, EPSILON, DriveKind, friction_parameters
 from springline.model.hardware import ACTUATORS, SENSORS
 from springline.model.integrators import INTEGRATORS
@@ -453,7 +462,7 @@ def _expect_control_defaults(mechanism: Mechanism, own: Mapping[str, Iterable[Pa
 
     "<table>.<name>" of a table that neither has may be meant for a class of another file.
     """
-    packaged = (*CONTROLLERS.values(), *OBSERVERS.values())
+    packaged: list[Controller | Observer] = [*CONTROLLERS.values(), *OBSERVERS.values()]
     tables = {item.name: [each.name for each in item.parameters] for item in packaged}
     tables |= {table: [item.name for item in declared] for table, declared in own.items()}
     shared = [item.name for item in control_parameters(mechanism)]
