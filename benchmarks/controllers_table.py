@@ -1,4 +1,4 @@
-"""The table of docs/controllers.md: how well each controller holds the arm on a ship, alone and with help.
+"""The tables of docs/controllers.md: how well each controller holds the arm on a ship, alone and with help.
 
     python -m benchmarks.controllers_table [--write]
 
@@ -30,9 +30,14 @@ SHIPS: Mapping[str, Mapping[str, object]] = {
 HELP: Mapping[str, Mapping[str, object]] = {
     "alone": {},
     "disturbance": {"control.observer": "disturbance"},
+    "disturbance, spring": {"control.observer": "disturbance", "control.disturbance.input": "spring"},
     "extended_state": {"control.observer": "extended_state"},
+    "extended_state, spring": {"control.observer": "extended_state", "control.extended_state.input": "spring"},
     "feedforward": {"control.feedforward": "base"},
 }
+TURNING = ("paper/group1_pitch", "paper/group1_roll")
+"""Ships of the short table, with the true payload: base motions of the paper that turn."""
+
 PAYLOADS = (1.0, 1.2, 0.8)
 """Factors on the plant's m3 and J; the controller keeps its own."""
 
@@ -85,6 +90,13 @@ def rows() -> Iterator[str]:
                 ]
                 yield f"| {controller} | {name} | {' | '.join(cells)} |"
         yield ""
+    yield f"| true payload | help | {' | '.join(f'`{ship}`' for ship in TURNING)} |"
+    yield "|---" * (2 + len(TURNING)) + "|"
+    for controller in CONTROLLERS:
+        for name in ("alone", "disturbance", "feedforward"):
+            changes = {"control.controller": controller, **HELP[name]}
+            yield f"| {controller} | {name} | {' | '.join(cell(ship, changes) for ship in TURNING)} |"
+    yield ""
 
 
 def main() -> int:

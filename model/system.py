@@ -679,7 +679,10 @@ class System:
             )
         noise_in, noise_names = ([self.noise], ["noise"]) if self.noise.numel() else ([], [])
         if self.structure.effects:
-            seen, later, control_terms = (ca.substitute(values, [x], [y]) for values in (seen, later, control_terms))
+            with as_written():  # the operations that the controller does to what it is shown
+                seen, later, control_terms = (
+                    ca.substitute(values, [x], [y]) for values in (seen, later, control_terms)
+                )
         seen[1:3] = judged
         sampling, sampling_names = [*ins, *noise_in], [*names, *noise_names]
         updating, updating_names = [*sampling, self.h], [*sampling_names, "h"]

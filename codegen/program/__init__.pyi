@@ -19,6 +19,7 @@ from .operations import function_name as function_name
 from .operations import print_operation as print_operation
 from .stepping import kept_slopes as kept_slopes
 from .stepping import kernel_update as kernel_update
+from .stepping import scalar_points as scalar_points
 from .stepping import scalar_slopes as scalar_slopes
 from .stepping import scalar_stages as scalar_stages
 from .stepping import updates as updates

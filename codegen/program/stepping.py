@@ -79,10 +79,15 @@ def scalar_slopes(tableau: Tableau) -> tuple[str, ...]:
     return (*once, *(f"slope_{k}" for k in kept))
 
 
+def scalar_points(tableau: Tableau) -> tuple[str, ...]:
+    """Names of the arrays that `scalar_stages` has states in: from `x` to `next`, by way of `at` if there is one."""
+    return ("x", "at", "next") if tableau.stages > 1 else ("x", "next")
+
+
 def scalar_stages(
     tableau: Tableau, real: Real, states: int, evaluate: Callable[[int, str, str], list[str]]
 ) -> Iterator[str]:
-    """Lines of C that take the array x to the array next, with `at` and `scalar_slopes` to work in.
+    """Lines of C that take the array x to the array next: `scalar_points` and `scalar_slopes` are what they work in.
 
     real      number type
     states    length of the arrays

@@ -43,7 +43,7 @@ class DisturbanceObserver(_Driven):
 
     name = "disturbance"
     title = "disturbance observer of first order"
-    parameters = (Parameter("bandwidth", "1/s", 15.0, "of the estimate", POSITIVE, per_joint=True),)
+    parameters = (Parameter("bandwidth", "1/s", 6.0, "of the estimate", POSITIVE, per_joint=True),)
     states = (Quantity("xi_d", r"\xi_d", "{q}/s^2", "disturbance observer's state"),)
 
     def driven_by(self, source: ObserverInput) -> DisturbanceObserver:

@@ -1,4 +1,7 @@
 from .checking import resolve as resolve
+from .control_tables import CHOOSERS as CHOOSERS
+from .control_tables import table_chosen as table_chosen
+from .control_tables import table_in as table_in
 from .dotted import canonical_key as canonical_key
 from .dotted import expect_keys as expect_keys
 from .locate import expect_kind as expect_kind

@@ -28,6 +28,7 @@ from springline.model.system import System, system_of
 from springline.runner.files import InputError, Problem, document_text, read_toml, shortened, unknown
 from springline.runner.scenario import schema
 from springline.runner.scenario.checking import Document, resolve, size_given
+from springline.runner.scenario.control_tables import CHOOSERS, table_of
 from springline.runner.scenario.dotted import (
     canonical_key,
     expect_keys,
@@ -165,6 +166,12 @@ class Scenario:
     def registered(self, name: str) -> str:
         """What a mechanism, controller, law or base motion that the document names is registered as."""
         return next((user.key for user in self.code if user.reference == name), name)
+
+    @property
+    def control_tables(self) -> frozenset[str]:
+        """Names of the tables [control.<name>] that it has: of its controller, its observer, a law of one's own."""
+        chosen = {key: self.registered(self.document["control"][key.partition(".")[2]]) for key in CHOOSERS}
+        return frozenset(table for key, name in chosen.items() if (table := table_of(key, name)))
 
     def structure(self) -> Structure:
         """Everything about the scenario that is no number."""

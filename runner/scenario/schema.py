@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, Validat
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
 from springline.codegen.kernel import LARGEST_SEED, MOST_STEPS
+from springline.codegen.nearest import nearest
 from springline.codegen.numbers import double
 from springline.model.base import COORDINATES, MOUNT, MOUNT_RPY
 from springline.model.base_motion import MOTIONS
@@ -25,7 +26,9 @@ from springline.model.control import (
     LAWS,
     OBSERVERS,
     VELOCITY_CUTOFF,
+    Controller,
     LogForm,
+    Observer,
 )
 from springline.model.drive import DRIVES, EPSILON, DriveKind, friction_parameters
 from springline.model.hardware import ACTUATORS, SENSORS
@@ -405,7 +408,8 @@ def schema(
 
     size    how many joints the mechanism has, 0 for as many as it has by default
     motion  what a base motion of a user's own is registered as, which is then a kind too; "" if there is none
-    Raises ValueError for a controller, law or observer whose table [control.<its name>] would be a key already.
+    Raises ValueError for a controller, law or observer whose table [control.<its name>] would be a key already, and
+    for a mechanism with a default for a parameter that none has.
     """
     mechanism = MECHANISMS[name].of_size(size)
     joints = mechanism.joints
@@ -417,6 +421,7 @@ def schema(
     for taken in own:
         if taken in shared or taken in ControlStructure.model_fields:
             raise ValueError(f"{taken!r} is a key of [control] already: give the class another name")
+    _expect_control_defaults(mechanism, own)
     tables = _own_tables(own, joints, _inputs(observer, drive))
     position, rate = (_each("{q}", REAL, joints), _each("{q}/s", REAL, joints))
     initial = {
@@ -454,6 +459,26 @@ def schema(
             },
         },
     )
+
+
+def _expect_control_defaults(mechanism: Mechanism, own: Mapping[str, Iterable[Parameter]]) -> None:
+    """Raise ValueError for a name in `control_defaults` that means nothing to what comes with springline or was chosen.
+
+    "<table>.<name>" of a table that neither has may be meant for a class of another file.
+    """
+    packaged: list[Controller | Observer] = [*CONTROLLERS.values(), *OBSERVERS.values()]
+    tables = {item.name: [each.name for each in item.parameters] for item in packaged}
+    tables |= {table: [item.name for item in declared] for table, declared in own.items()}
+    shared = [item.name for item in control_parameters(mechanism)]
+    known = [*shared, *(name for names in tables.values() for name in names)]
+    dotted = [f"{table}.{name}" for table, names in tables.items() for name in names]
+    for name in mechanism.control_defaults:
+        table, dot, _ = name.partition(".")
+        if name not in (known if not dot else dotted) and (not dot or table in tables):
+            valid = dotted if dot else known
+            text = f"mechanism {mechanism.name}: control_defaults: there is no parameter {name!r}"
+            other = "" if dot else " (of a class of another file: '<its name>.<parameter>')"
+            raise ValueError(f"{text}; did you mean {nearest(name, valid, 0.0)!r}?{other}")
 
 
 def _sensor(joints: Sequence[Joint]) -> dict[str, Any]:

@@ -79,7 +79,7 @@ class AxisChecks:
             return [Problem(self.sweep.source, label, text)]
         if axis.kind != "tie" and not axis.values:
             numeric = self.sweep.scenario.numeric_keys()
-            known = {**numeric, **dict.fromkeys(_document_keys(self.sweep.scenario))}
+            known = {**numeric, **self.numeric, **dict.fromkeys(_document_keys(self.sweep.scenario))}
             if axis.key not in known:
                 return [unknown(self.sweep.source, label, "key", axis.key, known)]
             if axis.key in numeric:

@@ -37,7 +37,7 @@ def settling_map(runs: Runs) -> Figure:
     mesh = None
     for g in range(shown):
         for axes, column, joint in zip(grid[g], columns, runs.joints, strict=True):
-            chosen = runs.group == g
+            chosen = (runs.group == g) & np.isfinite([runs[key] for key in runs.keys]).all(axis=0)
             where = [_cells(runs[key][chosen], e) for key, e in zip(runs.keys, edges, strict=True)]
             stopped = _binned(where, (~runs.ok[chosen]).astype(float), edges)
             settled = _binned(where, np.where(runs.ok[chosen], runs[column][chosen], np.nan), edges)
@@ -70,7 +70,7 @@ def settling_map(runs: Runs) -> Figure:
 
 def _edges(runs: Runs, key: str) -> Floats:
     """Edges of the cells along a key: around the points of a grid, or forty of equal width."""
-    values = np.unique(runs[key])
+    values = np.unique(runs[key][np.isfinite(runs[key])])
     logarithmic = runs.logarithmic[key] or (values[0] > 0 and len(values) > 2 and _is_geometric(values))
     runs.logarithmic[key] = logarithmic
     values = np.log(values) if logarithmic else values

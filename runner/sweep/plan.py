@@ -23,7 +23,9 @@ from springline.model.parameters import Joint
 from springline.runner.files import InputError, Problem, unknown, value_text
 from springline.runner.run import field, metrics_schema, metrics_table, trajectory_schema
 from springline.runner.scenario import (
+    CHOOSERS,
     DOOR_KEYS,
+    NumericKey,
     Record,
     Scenario,
     UserClass,
@@ -33,6 +35,8 @@ from springline.runner.scenario import (
     names_file,
     portable_text,
     records,
+    table_chosen,
+    table_in,
     weighs,
 )
 from springline.runner.scenario import FOLDER as TABLES
@@ -69,7 +73,8 @@ _MOST_STEPS_IN_ALL = 2**63 - 1  # the counter of the loop's progress
 class Group:
     """Neighbouring runs with one structure and timing.
 
-    constants    what the keys that do not vary inside the group are, by key, in the order of the sweep
+    constants    what the keys that do not vary inside the group are, by key, in the order of the sweep; None for one
+                 of a table [control.<name>] that the group's scenario does not have
     first, runs  its runs are first .. first+runs-1;  row  of the sample that its first run takes
     """
 
@@ -112,7 +117,10 @@ class Plan:
         self.runs = sweep.samples * math.prod(len(axis.values) for axis in sweep.axes if axis.kind == "each")
         grouping = {axis.key for axis in sweep.axes if _switches(axis.key, axis.reach(sweep.axes))}
         grouping |= {axis.key for axis in sweep.axes if _takes_out_a_mount(axis, sweep)}
-        self._numeric = {k: v for k, v in sweep.scenario.numeric_keys().items() if k not in grouping}
+        self._scenarios: dict[str, Scenario] = {}
+        self._switched = self._switched_tables()
+        numeric = self._switched_numbers() | sweep.scenario.numeric_keys()
+        self._numeric = {k: v for k, v in numeric.items() if k not in grouping}
         self._free = [axis for axis in sweep.axes if axis.kind != "tie"]
         self._outer = [axis for axis in self._free if self._groups_runs(axis)]
         self._inner = [axis for axis in self._free if axis not in self._outer]
@@ -193,7 +201,7 @@ class Plan:
             for first in range(0, group.runs, _DRAWN_AT_ONCE):
                 runs = min(_DRAWN_AT_ONCE, group.runs - first)
                 columns = self.columns(Chunk(-1, group, group.first + first, runs))
-                found = group.scenario.implausible_run({k: v for k, v in columns.items() if k in self._numeric})
+                found = group.scenario.implausible_run(self._numbers(group, columns))
                 if found is None:
                     continue
                 run, text = found
@@ -211,9 +219,13 @@ class Plan:
             axis.key: drawn[axis.key] if axis.key in drawn else self._repeated(axis, chunk) for axis in self.sweep.axes
         }
 
+    def _numbers(self, group: Group, columns: Columns) -> Columns:
+        """Those of the columns that are numbers of the runs of a group."""
+        return {k: v for k, v in columns.items() if k in self._numeric and self._counts(k, group.scenario)}
+
     def _repeated(self, axis: Axis, chunk: Chunk) -> NDArray[Any]:
         value = chunk.group.constants[axis.key]
-        if axis.key not in self._numeric:
+        if axis.key not in self._numeric and value is not None:
             value = _cell(value, self._structural_type(axis))
         return np.full(chunk.runs, value, dtype=np.float64 if isinstance(value, float) else object)
 
@@ -229,21 +241,29 @@ class Plan:
 
     def parameters(self, chunk: Chunk, columns: Columns) -> Floats:
         """The kernel's parameters of each run of a chunk with the given columns, (runs, parameters)."""
-        numbers = {key: column for key, column in columns.items() if key in self._numeric}
+        numbers = self._numbers(chunk.group, columns)
         return chunk.group.work.chosen(chunk.group.scenario.slots_for(numbers), chunk.runs)
 
     def scenario_of(self, run: int) -> Scenario:
         """The scenario of one run. Raises IndexError if there is no such run."""
         chunk = self.chunk_of(run)
-        columns = self.columns(chunk)
-        numbers = {key: float(columns[key][run - chunk.first]) for key in columns if key in self._numeric}
+        columns = self._numbers(chunk.group, self.columns(chunk))
+        numbers = {key: float(column[run - chunk.first]) for key, column in columns.items()}
         scenario = chunk.group.scenario
         return scenario.with_overrides(numbers | ({"sensor.run": run} if scenario.noisy else {}))
 
     def table(self, chunk: Chunk, columns: Columns, outcome: Outcome) -> pa.Table:
-        """One row a run of a chunk with the given columns: run, every key of the sweep, every metric, status, t_end."""
-        runs = np.arange(chunk.first, chunk.first + chunk.runs)
-        keys = [pa.array(columns[item.name], item.type) for item in self.key_fields]
+        """One row a run of a chunk with the given columns: run, every key of the sweep, every metric, status, t_end.
+
+        A key of a table [control.<name>] that the runs do not have is null.
+        """
+        runs, scenario = np.arange(chunk.first, chunk.first + chunk.runs), chunk.group.scenario
+        keys = [
+            pa.array(columns[item.name], item.type)
+            if self._counts(item.name, scenario)
+            else pa.nulls(len(runs), item.type)
+            for item in self.key_fields
+        ]
         found = metrics_table(chunk.group.work.system, outcome.runs)
         metrics = [
             found[item.name] if item.name in found.column_names else pa.nulls(len(runs), item.type)
@@ -351,6 +371,35 @@ class Plan:
             self._read[id(scenario)] = records(scenario)
         return self._read[id(scenario)]
 
+    # Tables [control.<name>] of what the sweep chooses
+
+    def _switched_tables(self) -> dict[str, dict[str, Any]]:
+        """Tables that some runs have and some may not -> the overrides of the scenario that make it have them."""
+        scenario = self.sweep.scenario
+        axes = [axis for axis in self.sweep.axes if axis.key in CHOOSERS]
+        found: dict[str, dict[str, Any]] = {table: {} for table in scenario.control_tables if axes}
+        for axis in axes:
+            for value in axis.values:
+                table = table_chosen(axis.key, value, scenario.folder, f"{self.sweep.source}: vary")
+                found.setdefault(table, {axis.key: value})
+        found.pop("", None)
+        return found
+
+    def _switched_numbers(self) -> dict[str, NumericKey]:
+        """The numeric keys of those tables."""
+        varied = {table_in(axis.key) for axis in self.sweep.axes}
+        return {
+            key: number
+            for table, choice in self._switched.items()
+            if table in varied
+            for key, number in self._structured(choice).numeric_keys().items()
+            if table_in(key) == table
+        }
+
+    def _counts(self, key: str, scenario: Scenario) -> bool:
+        """Whether a key of the sweep is one of a scenario of its runs."""
+        return table_in(key) not in self._switched or table_in(key) in scenario.control_tables
+
     # Making groups
 
     def _groups_runs(self, axis: Axis) -> bool:
@@ -376,7 +425,7 @@ class Plan:
         rows = self.runs // math.prod(len(axis.values) for axis in crossed)
         edges = [rows * i // len(shares) for i in range(len(shares) + 1)]
         groups: list[Group] = []
-        works: dict[str, tuple[Scenario, Work]] = {}
+        works: dict[int, Work] = {}
         first = 0
         for fixed in itertools.product(*(range(len(axis.values)) for axis in crossed)):
             for share, low, high in zip(shares, edges[:-1], edges[1:], strict=True):
@@ -384,12 +433,11 @@ class Plan:
                     continue
                 chosen = {axis.key: i for axis, i in zip([*crossed, *shared], [*fixed, *share], strict=True)}
                 constants = self._constants(chosen)
-                structural = {key: value for key, value in constants.items() if key not in self._numeric}
-                name = given_text(structural)
-                if name not in works:
-                    scenario = self._structured(structural)
-                    works[name] = scenario, self._work(scenario)
-                groups.append(Group(len(groups), constants, *works[name], first, high - low, low))
+                scenario = self._structured({k: v for k, v in constants.items() if k not in self._numeric})
+                if id(scenario) not in works:
+                    works[id(scenario)] = self._work(scenario)
+                constants = {k: v if self._counts(k, scenario) else None for k, v in constants.items()}
+                groups.append(Group(len(groups), constants, scenario, works[id(scenario)], first, high - low, low))
                 first += high - low
         return groups
 
@@ -406,18 +454,42 @@ class Plan:
         return {key: float(value) if key in self._numeric else value for key, value in constants.items()}
 
     def _structured(self, structural: Mapping[str, Any]) -> Scenario:
-        if not structural:
-            return self.sweep.scenario
-        try:
-            return self.sweep.scenario.with_overrides(structural)
-        except InputError as error:
-            moved = (replace(problem, where=self.sweep.source, key=f"vary.{problem.key}") for problem in error.problems)
-            raise InputError(*moved) from error
+        """The scenario with what is held back and these overrides, as far as they are of tables that it then has."""
+        base, held = self.sweep.scenario, self.sweep.held
+        chosen = {key: structural.get(key, base.document["control"][key.partition(".")[2]]) for key in CHOOSERS}
+        where = f"{self.sweep.source}: vary"
+        tables = {table_chosen(key, value, base.folder, where) for key, value in chosen.items()}
+        idle = self._switched.keys() - tables
+        wanted = {key: value for key, value in {**held, **structural}.items() if table_in(key) not in idle}
+        if not wanted:
+            return base
+        name = given_text(wanted)
+        if name not in self._scenarios:
+            try:
+                self._scenarios[name] = base.with_overrides(wanted)
+            except InputError as error:
+                raise InputError(
+                    *(
+                        replace(problem, where=self.sweep.source, key=f"{self._said(problem.key)}.{problem.key}")
+                        for problem in error.problems
+                    )
+                ) from error
+        return self._scenarios[name]
+
+    def _said(self, key: str) -> str:
+        """Which table of the sweep a key stands in."""
+        stem = key
+        while stem and stem not in self.sweep.held:
+            stem = stem.rpartition(".")[0]
+        return "set" if stem else "vary"
 
     def _work(self, scenario: Scenario) -> Work:
         """The Work of a group: which slots its keys move is seen by moving them, one axis at a time."""
         valid = scenario.numeric_keys()
-        missing = [axis.key for axis in self.sweep.axes if axis.key in self._numeric and axis.key not in valid]
+        numeric = [
+            axis.key for axis in self.sweep.axes if axis.key in self._numeric and self._counts(axis.key, scenario)
+        ]
+        missing = [key for key in numeric if key not in valid]
         if missing:
             kind, source = "numeric key of a group", self.sweep.source
             raise InputError(*(unknown(source, f"vary.{key}", kind, key, valid) for key in missing))
@@ -425,7 +497,7 @@ class Plan:
         start = {axis.key: self._extremes(axis)[0] for axis in self._free}
         for axis in self._free:
             probes += [self._probe(start | {axis.key: extreme}) for extreme in self._extremes(axis)]
-        columns = {key: np.array([probe[key] for probe in probes]) for key in probes[0]} if probes else {}
+        columns = {key: np.array([probe[key] for probe in probes]) for key in numeric} if probes else {}
         return work_for(scenario, scenario.slots_for(columns))
 
     def _extremes(self, axis: Axis) -> list[tuple[float, int]]:

@@ -169,7 +169,10 @@ def group_names(plan: Plan) -> list[str]:
         return ["all"]
     tied = {axis.key for axis in plan.sweep.axes if axis.kind == "tie"}
     constants = ({key: value for key, value in group.constants.items() if key not in tied} for group in plan.groups)
-    return [", ".join(f"{key.rpartition('.')[2]} = {short(value)}" for key, value in c.items()) for c in constants]
+    return [
+        ", ".join(f"{key.rpartition('.')[2]} = {short(value)}" for key, value in c.items() if value is not None)
+        for c in constants
+    ]
 
 
 def short(value: object) -> str:

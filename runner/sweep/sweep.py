@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from springline.codegen.numbers import double
@@ -61,6 +61,7 @@ class Sweep:
     samples   rows to draw; of a grid the product of its axes
     chunk     runs per part, 0: to be chosen
     keep      store the trajectory of every `keep`-th run, 0: of none
+    held      values of tables [control.<name>] that the scenario does not have, for the runs that do
     """
 
     source: str
@@ -71,16 +72,18 @@ class Sweep:
     chunk: int
     keep: int
     axes: tuple[Axis, ...]
+    held: Mapping[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """What decides the runs beside the scenario, as plain data; the order of the keys is part of it."""
+        held = [{"key": key, "value": value_text(value)} for key, value in self.held.items()]
         return {
             "method": self.method,
             "samples": self.samples,
             "seed": self.seed,
             "keep": {"trajectories": self.keep} if self.keep else {},
             "vary": [{"key": axis.key, "axis": value_text(axis.as_toml())} for axis in self.axes],
-        }
+        } | ({"set": held} if held else {})
 
 
 def is_number(value: object) -> bool:

@@ -7,7 +7,7 @@
     chunk = 1024                                runs per part of the dataset; chosen if left out
 
     [set]                                       overrides of the scenario for all runs, by dotted key
-    simulation.duration = 2.0
+    simulation.duration = 2.0                   (a table [control.<name>]: for those whose controller, … it is)
 
     [vary]
     control.delta = { log_uniform = [0.01, 0.1] }
@@ -36,12 +36,15 @@ from typing import Any, cast, get_args
 from springline.codegen.nearest import nearest
 from springline.runner.files import InputError, Problem, read_toml, unknown
 from springline.runner.scenario import (
+    CHOOSERS,
     Scenario,
     absent_at,
     draft_scenario,
     given_text,
     load_scenario,
     read_sweep,
+    table_chosen,
+    table_in,
 )
 from springline.runner.sweep.sweep import Axis, Kind, Method, Sweep, is_number
 
@@ -82,7 +85,8 @@ def sweep_from_json(entry: Mapping[str, Any], chunk: int, scenario: Scenario, so
     Raises InputError, or KeyError, TypeError, AttributeError or ValueError where it has not even the shape.
     """
     vary = {item["key"]: read_toml(f"axis = {item['axis']}")["axis"] for item in entry["vary"]}
-    document = {**entry, "vary": vary, "chunk": chunk}
+    held = {item["key"]: read_toml(f"value = {item['value']}")["value"] for item in entry.get("set", ())}
+    document = {**entry, "set": held, "vary": vary, "chunk": chunk}
     if entry["method"] == "grid":
         del document["samples"]
     sweep = _Reader(source, Path()).sweep(document, scenario)
@@ -115,13 +119,15 @@ class _Reader:
         keep = self._keep(document.get("keep", {}))
         axes = self._axes(document.get("vary", {}), method)
         self._expect_effect(axes)
-        scenario = scenario or self._scenario(document)
+        held: Mapping[str, object] = document.get("set", {})
+        if scenario is None:
+            scenario, held = self._scenario(document, axes)
         samples = self._samples(document, cast(Method, method), axes)
         if self._problems or scenario is None:
             raise InputError(*self._problems)
         reached = {axis.key: axis.reach(axes) for axis in axes if absent_at(axis.key) is not None}
         scenario = scenario.including({key: numbers for key, numbers in reached.items() if 0.0 not in numbers})
-        return Sweep(self._name, scenario, cast(Method, method), samples, seed, chunk, keep, tuple(axes))
+        return Sweep(self._name, scenario, cast(Method, method), samples, seed, chunk, keep, tuple(axes), held)
 
     def _expect_effect(self, axes: Sequence[Axis]) -> None:
         """An override of a key that varies would have none."""
@@ -154,29 +160,48 @@ class _Reader:
         self._problems += [unknown(self._name, f"keep.{key}", "key", key, ["trajectories"]) for key in wrong]
         return self._whole(table, "trajectories", 0, 1, MOST_RUNS, "keep.trajectories")
 
-    def _scenario(self, document: Mapping[str, Any]) -> Scenario | None:
+    def _scenario(self, document: Mapping[str, Any], axes: Sequence[Axis]) -> tuple[Scenario | None, dict[str, object]]:
+        """The scenario with its overrides, and those that are held back: of tables that only runs of the sweep have."""
         source = document.get("scenario", "paper/nominal")
         overrides = document.get("set", {})
         if not isinstance(source, str):
             self._wrong("scenario", "expected the name or path of a scenario", source)
-            return None
+            return None, {}
         if not isinstance(overrides, dict):
             self._wrong("set", "expected a table of dotted keys", overrides)
-            return None
+            return None, {}
         path, key = self._folder / source, "scenario"
         changes = [("set", dict(_flattened(overrides)), self._folder), ("", self._overrides, Path())]
-        changes = [change for change in changes if change[1]]
         try:
+            offered = {
+                table_chosen(axis.key, value, self._folder, f"{self._name}: vary")
+                for axis in axes
+                if axis.key in CHOOSERS
+                for value in axis.values
+            }
+            held: dict[str, object] = {
+                name: value for _, change, _ in changes for name, value in change.items() if table_in(name) in offered
+            }
+            # Whose tables the scenario has itself is known when all else is set.
+            draft = draft_scenario(path if path.is_file() else source)
+            for label, change, folder in changes if held else ():
+                key = label
+                rest = {name: value for name, value in change.items() if name not in held}
+                draft = replace(draft, folder=folder).with_overrides(rest, read=False)
+            held = {name: value for name, value in held.items() if table_in(name) not in draft.control_tables}
+            changes = [(k, {n: v for n, v in c.items() if n not in held}, folder) for k, c, folder in changes]
+            changes = [change for change in changes if change[1]]
+            key = "scenario"
             load = draft_scenario if changes else load_scenario
             scenario = load(path if path.is_file() else source)
             for k, (label, change, folder) in enumerate(changes):  # files are read when all changes are made
                 key = label
                 scenario = replace(scenario, folder=folder).with_overrides(change, read=k + 1 == len(changes))
-            return replace(scenario, folder=self._folder)
+            return replace(scenario, folder=self._folder), held
         except InputError as error:
             there = f"{self._name}: {key}: " if key else ""
             self._problems += [replace(problem, where=f"{there}{problem.where}") for problem in error.problems]
-            return None
+            return None, {}
 
     def _samples(self, document: Mapping[str, Any], method: Method, axes: Sequence[Axis]) -> int:
         each = math.prod(len(axis.values) for axis in axes if axis.kind == "each")

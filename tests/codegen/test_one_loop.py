@@ -170,6 +170,7 @@ ALL_FRICTION = tuple(item.name for item in FRICTION)
 OTHERS = [
     ("one_link", "elastic", "rk4", ALL_FRICTION),
     ("one_link", "rigid", "dop853", ()),
+    ("one_link", "rigid", "euler", ()),
     ("three_links", "elastic", "dop853", ()),
     ("three_links", "rigid", "midpoint", ALL_FRICTION[1:]),
 ]

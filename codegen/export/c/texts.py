@@ -13,7 +13,14 @@ from springline.codegen.export.c.interface import TypedInterface
 from springline.codegen.export.c.statuses import statuses
 from springline.codegen.export.c.vectors import TIME_STEP, control_outputs
 from springline.codegen.files import render
-from springline.codegen.program import constant_expression, literal, print_tables, scalar_slopes, scalar_stages
+from springline.codegen.program import (
+    constant_expression,
+    literal,
+    print_tables,
+    scalar_points,
+    scalar_slopes,
+    scalar_stages,
+)
 
 _ROW = 0.01  # s between the rows that main prints
 
@@ -109,6 +116,7 @@ def _stepping(export: Export, interface: TypedInterface) -> dict[str, Any]:
         return [f"{export.prefix}_evaluate_plant(controller, motion[{when}], {at}, {command}, {slope});"]
 
     return {
+        "points": scalar_points(tableau),
         "slopes": scalar_slopes(tableau),
         "plant_stages": list(scalar_stages(tableau, export.real, states, evaluate)),
     }

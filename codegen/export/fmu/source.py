@@ -19,7 +19,7 @@ from springline.codegen.export.fmu.variables import (
     structures_of,
 )
 from springline.codegen.files import render
-from springline.codegen.program import constant_expression, scalar_slopes, scalar_stages
+from springline.codegen.program import constant_expression, scalar_points, scalar_slopes, scalar_stages
 
 _HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
@@ -94,7 +94,7 @@ def _values(export: Export, typed: TypedInterface, interface: Interface, setting
         "reads": reads,
         "writes": writes,
         "rates": typed.rates,
-        "slopes": scalar_slopes(system.tableau),
+        "scratch": [*scalar_points(system.tableau)[1:-1], *scalar_slopes(system.tableau)],
         # Where the law is part of the differential equation.
         "closed_step": _closed_step(export, typed) if part == "loop" and settings.period == 0.0 else [],
     }

@@ -72,9 +72,11 @@ def batch(
     )
 
     loaded = load_sweep(sweep, overrides(changes, sweep))
-    for note in (*loaded.scenario.notes, *loaded.scenario.warnings):
+    for note in loaded.scenario.notes:
         complain(note)
     plan = Plan(loaded)
+    for warning in dict.fromkeys(text for group in plan.groups for text in group.scenario.warnings):
+        complain(warning)
     plan.expect_plausible()
     destination = output or str(Path("results", Path(sweep).stem))
     dataset = Dataset(place(destination))

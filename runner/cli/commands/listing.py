@@ -14,6 +14,7 @@ from springline.runner.files import InputError, Problem
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from springline.model.control import Controller, Observer
     from springline.model.parameters import Joint, Parameter
     from springline.runner.scenario import Scenario
 
@@ -41,7 +42,7 @@ def list_(
     no_code: NoCode = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
-    """List mechanisms, controllers, laws, scenarios and the like.
+    """List mechanisms, controllers and observers, laws, scenarios and the like.
 
     With a scenario, the parameters of its own arm, drive and controller, and their values.
     """
@@ -61,8 +62,11 @@ def list_(
     if as_json:
         print_json("list", rows, {})
         return
-    columns = list(rows[0])
-    print_table(columns, [[_text(row[column]) for column in columns] for row in rows])
+    for kind in dict.fromkeys(row.get("kind") for row in rows):  # a table of each
+        shown = [{key: value for key, value in row.items() if key != "kind"} for row in rows if row.get("kind") == kind]
+        columns = list(shown[0])
+        titles = [kind if kind and column == "name" else column for column in columns]
+        print_table(titles, [[_text(row[column]) for column in columns] for row in shown])
 
 
 def mechanisms() -> list[Row]:
@@ -82,12 +86,17 @@ def mechanisms() -> list[Row]:
 
 
 def controllers() -> list[Row]:
-    """Every controller with its own parameters, beside those of [control] that all have."""
-    from springline.model.control import CONTROLLERS
+    """Every controller, then every observer, with its own parameters, beside those of [control] that all have."""
+    from springline.model.control import CONTROLLERS, OBSERVERS
 
+    kinds: dict[str, Iterable[Controller | Observer]] = {
+        "controller": CONTROLLERS.values(),
+        "observer": OBSERVERS.values(),
+    }
     return [
-        {"name": item.name, "title": item.title, "parameters": [parameter.name for parameter in item.parameters]}
-        for item in CONTROLLERS.values()
+        {"kind": kind, "name": item.name, "title": item.title, "parameters": [each.name for each in item.parameters]}
+        for kind, items in kinds.items()
+        for item in items
     ]
 
 

@@ -853,6 +853,11 @@ def rows_of(what: str) -> list[dict[str, object]]:
     return rows
 
 
+def test_list_controllers_tells_observers_too() -> None:
+    kinds = {row["name"]: row["kind"] for row in rows_of("controllers")}
+    assert kinds["super_twisting"] == "controller" and kinds["extended_state"] == "observer"
+
+
 def test_list_parameters_of_a_scenario_tells_its_own() -> None:
     """An arm of a user's, which no other list has, on either drive; and what --set makes of it."""
     arm = Path(__file__).parents[3] / "examples" / "own_mechanism" / "deck.toml"

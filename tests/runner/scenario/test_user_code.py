@@ -499,3 +499,24 @@ def test_a_fault_of_our_own_is_none_of_the_user_s(folder: Path, monkeypatch: pyt
     (folder / "law.py").write_text(LAW + "# as no other test has it\n")
     with pytest.raises(KeyError, match="of ours"):
         load_scenario(folder / "law.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("mi", "there is no parameter 'mi'; did you mean 'mu'?"),
+        ("super_twisting.slop", "there is no parameter 'super_twisting.slop'; did you mean 'super_twisting.slope'?"),
+        ("super_twisting.slope", ""),
+        ("slope", ""),
+        ("of_another_file.gain", ""),
+    ],
+)
+def test_control_defaults_name_parameters_that_there_are(name: str, expected: str, tmp_path: Path) -> None:
+    file = tmp_path / "arm.py"
+    file.write_text(f"from springline.model import *\n{FULL}  control_defaults = {{{name!r}: 1.0}}\n")
+    if not expected:
+        load_scenario("paper/nominal", {"mechanism.name": f"{file}:Bad"})
+        return
+    with pytest.raises(InputError) as error:
+        load_scenario("paper/nominal", {"mechanism.name": f"{file}:Bad"})
+    assert expected in str(error.value)
