@@ -17,12 +17,14 @@ class Shape:
     groups  vectors that each statement is printed for, side by side
     packs   packs of groups that go through time in turn, block by block
     alive   values of a group from which on the order saves registers
+    paired  whether operations that joints have in common lie in the lanes of one vector, where a run is alone
     """
 
     span: Span
     groups: int
     packs: int
     alive: int
+    paired: bool = False
 
 
 # By lanes of a vector, each without and with sampled control; benchmarks/block_shapes.py measures what others take.

@@ -21,7 +21,7 @@ _MULTIPLIER, _ADDER, _SHUFFLER, _LOGIC = range(4)
 _PORTS = {
     **dict.fromkeys((Op.MUL, Op.DIV, Op.SQRT), _MULTIPLIER),
     **dict.fromkeys((Op.ADD, Op.SUB, Op.FMIN, Op.FMAX, Op.LT, Op.LE, Op.EQ, Op.NE, Op.BELOW), _ADDER),
-    **dict.fromkeys((Op.SHIFT_LEFT, Op.SHIFT_RIGHT), _SHUFFLER),
+    **dict.fromkeys((Op.SHIFT_LEFT, Op.SHIFT_RIGHT, Op.PAIR, Op.PAIR_MASKS), _SHUFFLER),
 }
 _LATENCY = {
     **dict.fromkeys((Op.MUL, Op.ADD, Op.SUB), 3),

@@ -41,7 +41,9 @@ class KernelSource:
         return hashlib.sha256(json.dumps([self.files, self.parameters]).encode()).hexdigest()
 
 
-def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes: Mapping[str, int]) -> str:
+def preamble(
+    program: Program, shape: Shape, *, width: int, sampled: bool, sizes: Mapping[str, int], alone: bool = False
+) -> str:
     """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
     memory, sliding = program.size("z"), len(program.system.sliding)
     channels = sum(len(table.channels) for table in program.system.tables)
@@ -68,6 +70,7 @@ def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes
     return f"""#define SL_W {width}
 #define SL_G {shape.groups}
 #define SL_PACKS {shape.packs}
+#define SL_ALONE {int(alone)}
 #define SL_SAMPLED {int(sampled)}
 #define SL_NZ {memory}
 #define SL_SLIDING {sliding}
@@ -121,11 +124,14 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
                 span=options.span or best.span,
                 groups=options.groups or best.groups,
                 packs=options.packs or best.packs,
+                paired=options.alone and (best.paired if options.paired is None else options.paired),
             )
 
         emission = lanes.emit(program, spec.constants)
         steps = print_steps(emission.values, sampled, shape)
-        start = preamble(program, steps.shape, width=width, sampled=sampled, sizes=emission.sizes)
+        start = preamble(
+            program, steps.shape, width=width, sampled=sampled, sizes=emission.sizes, alone=options.alone
+        )
         parameters = emission.tunable
         files = {**shared, "kernel.h": f"{start}\n{emission.text}\n{steps.text}"}
     return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)

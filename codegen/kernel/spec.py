@@ -29,6 +29,8 @@ class KernelOptions:
     groups   vectors worked on at once to hide latency, None for what pays
     span     what is printed as one block: "evaluation", "stage" or "step", None for what pays
     packs    so many times width x groups runs go through time side by side, None for what pays
+    alone    one run a vector: the same in both lanes, or two of its joints side by side
+    paired   whether joints are put side by side where a run is alone, None for what pays
     flags    optimisation flags, None for the best this machine can do
     compiler  None for the one that is found
     Raises ValueError for an unknown engine, and for counts that no kernel can have.
@@ -39,6 +41,8 @@ class KernelOptions:
     groups: int | None = None
     span: Span | None = None
     packs: int | None = None
+    alone: bool = False
+    paired: bool | None = None
     flags: tuple[str, ...] | None = None
     compiler: Compiler | None = None
 
@@ -52,9 +56,13 @@ class KernelOptions:
                 whole(name, getattr(self, name), 1, _MOST)
         if self.width is not None and self.width & (self.width - 1):
             raise ValueError(f"width is {self.width}, expected a power of two")
+        if self.alone and self.width not in (2, 4, 8):
+            raise ValueError(f"width is {self.width}, expected 2 for a run alone")
+        if self.paired and not self.alone:
+            raise ValueError("joints are paired where a run is alone: expected alone = True")
 
 
-ONE_RUN = KernelOptions(width=2, groups=1, packs=1)
+ONE_RUN = KernelOptions(width=2, groups=1, packs=1, alone=True)
 """For a run by itself: two lanes, the second repeats the first. The idle lane costs nothing, and in vector registers
 the bits of a double are at hand, without a detour through integer registers."""
 
