@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from springline.codegen.elementary import INFIX, Kind, Op
 from springline.codegen.kernel.block import Block, Primitive
+from springline.codegen.kernel.schedule import aliases
 from springline.codegen.program import constant_expression
 
 
@@ -59,9 +60,7 @@ def statements(
     groups  the index of each, as C has it
     """
     nodes = block.nodes
-    same: list[int] = []  # real and bits are other names of the same
-    for i, node in enumerate(nodes):
-        same.append(same[node.arguments[0]] if node.op in (Op.REAL, Op.BITS) else i)
+    same = aliases(block)
     scheduled, fine = set(order), {same[i] for i in block.fine}
     stores: dict[int, list[tuple[str, int]]] = {}
     for place, i in block.stores:

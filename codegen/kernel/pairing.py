@@ -1,418 +1,311 @@
-"""Joints in lanes: operations of a block that one run does twice become one on both lanes of a vector."""
+"""Joints in lanes: what a run alone computes for two joints becomes one operation on both lanes of a vector.
+
+Superword-level parallelism, as compilers call it: from results that belong together down to their operands, as long as
+both sides do the same. Each lane does the operations it would do by itself, so no bit changes.
+"""
 
 from __future__ import annotations
 
-import math
 import re
-from collections import Counter
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from springline.codegen.elementary import COMMUTATIVE, Kind, Op
-from springline.codegen.kernel.block import Block, Primitive
+from springline.codegen.kernel.block import Block
+from springline.codegen.kernel.schedule import LEAVES, aliases, latency
 
-_CONSTANTS = (Op.REAL_CONSTANT, Op.BITS_CONSTANT)
-_ALIASES = (Op.REAL, Op.BITS)
-_LEAVES = (Op.INPUT, *_CONSTANTS)
-_DEPTH = 8
+_CONSTANTS = frozenset({Op.REAL_CONSTANT, Op.BITS_CONSTANT})
+_DEPTH = 8  # to which shapes of expressions are told apart
+_STORED = re.compile(r"(.*)\[(\d+)\]\[@\]")
 
-
-def pairs_of(block: Block, joints: int) -> "Pairing":
-    found = Pairing(block)
-    element = re.compile(r"(.*)\[(\d+)\]\[@\]")
-    stores = {}
-    for text, place in block.stores:
-        m = element.fullmatch(text)
-        if m:
-            stores[m[1], int(m[2])] = place
-    for (name, k), place in stores.items():
-        if (k % joints) % 2 == 0 and k % joints + 1 < joints and (name, k + 1) in stores:
-            found.walk(place, stores[name, k + 1])
-    found.by_shape()
-    found.prune()
-    return found
-
-
-_PAIRED = {Kind.REAL: Op.PAIR, Kind.BITS: Op.PAIR, Kind.MASK: Op.PAIR_MASKS}
+Pair = tuple[int, int]
+"""Operations of the low and the high lane."""
 
 
 def paired(block: Block, joints: int) -> Block:
-    return _Rebuilt(pairs_of(block, joints)).block
+    """The block with two operations in one vector wherever that saves more than it costs to bring them together.
+
+    joints  how many there are: results are stored joint by joint
+    """
+    return _Rebuilt(_Pairs(block, joints)).block
+
+
+class _Pairs:
+    """Which operations of a block go together.
+
+    same      for each primitive that whose value it is another name of
+    operands  of each, by `same`
+    partners  of an operation: its pair
+    aligned   the arguments of an operation in a pair, as they meet those of the other
+    """
+
+    def __init__(self, block: Block, joints: int) -> None:
+        self.block, nodes = block, block.nodes
+        self.same = aliases(block)
+        self.operands = [[self.same[a] for a in node.arguments] for node in nodes]
+        self.results = [self.same[i] for i in (*(i for _, i in block.stores), *block.fine)]
+        needed = self._needed()
+        self.partners: dict[int, Pair] = {}
+        self.aligned: dict[int, Sequence[int]] = {}
+        self._users: dict[int, list[int]] = {i: [] for i in needed}
+        for i in needed:
+            for a in set(self.operands[i]):
+                self._users[a].append(i)
+        # Cycles from the beginning of the block to the end of an operation, and from there to the end of the block.
+        self._latency = {i: latency(nodes[i].op) for i in needed}
+        self._before: dict[int, int] = {}
+        self._after: dict[int, int] = {}
+        for i in needed:
+            self._before[i] = self._latency[i] + max((self._before[a] for a in self.operands[i]), default=0)
+        for i in reversed(needed):
+            self._after[i] = max((self._after[u] + self._latency[u] for u in self._users[i]), default=0)
+        self._longest = max(self._before.values(), default=0)
+        self._shapes = self._shapes_of(needed)
+        self._pair_results(joints)
+        for depth in (_DEPTH, _DEPTH // 2):
+            self._pair_alike([i for i in needed if nodes[i].op not in LEAVES], depth)
+        self._part_what_costs()
+
+    def _needed(self) -> list[int]:
+        found: set[int] = set()
+        stack = list(self.results)
+        while stack:
+            i = stack.pop()
+            if i not in found:
+                found.add(i)
+                stack.extend(self.operands[i])
+        return sorted(found)
+
+    def _shapes_of(self, needed: Sequence[int]) -> list[dict[int, int]]:
+        """For each depth, a number that operations share whose expressions are alike down to there."""
+        nodes, numbers = self.block.nodes, dict[object, int]()
+
+        def number(key: object) -> int:
+            return numbers.setdefault(key, len(numbers))
+
+        shapes = [{i: number("constant" if nodes[i].op in _CONSTANTS else nodes[i].op.name) for i in needed}]
+        for _ in range(_DEPTH):
+            last, shape = shapes[-1], dict[int, int]()
+            for i in needed:
+                node, below = nodes[i], [last[a] for a in self.operands[i]]
+                if node.op in COMMUTATIVE:
+                    below.sort()
+                shape[i] = last[i] if node.op in LEAVES else number((node.op.name, node.number, *below))
+            shapes.append(shape)
+        return shapes
+
+    def _likeness(self, i: int, j: int) -> int:
+        """Down to which depth two expressions are alike."""
+        if i == j or self.partners.get(i) == (i, j):
+            return _DEPTH + 1
+        return next((k for k, shape in enumerate(self._shapes) if shape[i] != shape[j]), _DEPTH)
+
+    def _pair_results(self, joints: int) -> None:
+        """Pair what is stored for neighbouring joints, down from there."""
+        stored: dict[tuple[str, int], int] = {}
+        for text, place in self.block.stores:
+            if found := _STORED.fullmatch(text):
+                stored[found[1], int(found[2])] = place
+        for (name, k), place in stored.items():
+            if k % joints % 2 == 0 and k % joints + 1 < joints and (name, k + 1) in stored:
+                self._pair(self.same[place], self.same[stored[name, k + 1]])
+
+    def _pair_alike(self, computed: Sequence[int], depth: int) -> None:
+        """Pair what is left and alike to a depth, down from there."""
+        groups: dict[int, list[int]] = {}
+        for i in computed:
+            if i not in self.partners:
+                groups.setdefault(self._shapes[depth][i], []).append(i)
+        for members in sorted(groups.values(), key=lambda group: -group[-1]):
+            left = [i for i in members if i not in self.partners]
+            while len(left) > 1:
+                self._pair(left[0], left[1])
+                del left[: 2 if left[0] in self.partners else 1]
+
+    def _pair(self, low: int, high: int) -> None:
+        """Pair two operations and, as far as they do the same, their operands."""
+        nodes, stack = self.block.nodes, [(low, high)]
+        while stack:
+            i, j = stack.pop()
+            a, b = nodes[i], nodes[j]
+            if i == j or i in self.partners or j in self.partners or a.op in LEAVES:
+                continue
+            if a.op is not b.op or a.number != b.number or not self._fit(i, j):
+                continue
+            left, right = a.arguments, b.arguments
+            if a.op in COMMUTATIVE:
+                first, second = (self.same[x] for x in left)
+                other, another = (self.same[x] for x in right)
+                straight = self._likeness(first, other) + self._likeness(second, another)
+                if self._likeness(first, another) + self._likeness(second, other) > straight:
+                    right = right[::-1]
+            self.partners[i] = self.partners[j] = (i, j)
+            self.aligned[i], self.aligned[j] = left, right
+            self._wait(i, j)
+            stack.extend((self.same[x], self.same[y]) for x, y in zip(left[::-1], right[::-1], strict=True))
+
+    def _together(self, i: int) -> Sequence[int]:
+        return self.partners.get(i, (i,))
+
+    def _fit(self, i: int, j: int) -> bool:
+        """Whether neither follows from the other, and the longest way through the block stays as it is."""
+        before, after = self._before, self._after
+        if max(before[i], before[j]) + max(after[i], after[j]) > self._longest:
+            return False
+        first, last = (i, j) if before[i] < before[j] else (j, i)
+        seen, stack = set[int](), [last] if before[first] != before[last] else []
+        while stack:
+            for k in self._together(stack.pop()):
+                for a in self.operands[k]:
+                    if a == first:
+                        return False
+                    if before[a] > before[first] and a not in seen:
+                        seen.add(a)
+                        stack.append(a)
+        return True
+
+    def _wait(self, i: int, j: int) -> None:
+        """Let each wait for the other, and all that follows on them."""
+        self._before[i] = self._before[j] = max(self._before[i], self._before[j])
+        self._after[i] = self._after[j] = max(self._after[i], self._after[j])
+        stack = [i, j]
+        while stack:
+            k = stack.pop()
+            for user in self._users[k]:
+                for m in self._together(user):
+                    if self._before[m] < self._before[k] + self._latency[m]:
+                        self._before[m] = self._before[k] + self._latency[m]
+                        stack.append(m)
+        stack = [i, j]
+        while stack:
+            k = stack.pop()
+            for operand in self.operands[k]:
+                for m in self._together(operand):
+                    if self._after[m] < self._after[k] + self._latency[k]:
+                        self._after[m] = self._after[k] + self._latency[k]
+                        stack.append(m)
+
+    def _part_what_costs(self) -> None:
+        """Part connected pairs again that save no more than they cost."""
+        pairs = list(dict.fromkeys(self.partners.values()))
+        links = {pair: pair for pair in pairs}
+
+        def root(pair: Pair) -> Pair:
+            while links[pair] != pair:
+                links[pair] = pair = links[links[pair]]
+            return pair
+
+        costs: dict[tuple[str, int, int], Pair] = {}  # each once, to whom it falls first
+        for pair in pairs:
+            for i, j in self._operands_of(pair):
+                if self.partners.get(i) == (i, j):
+                    links[root((i, j))] = root(pair)
+                elif i == j and i in self.partners:
+                    costs.setdefault(("both", i, j), self.partners[i])
+                elif i != j and not {self.block.nodes[i].op, self.block.nodes[j].op} <= _CONSTANTS:
+                    costs.setdefault(("pair", i, j), pair)
+            if any(user not in self.partners for user in self._users[pair[1]]):
+                costs.setdefault(("both", pair[1], pair[1]), pair)
+        for i in self.results:
+            if i in self.partners:
+                costs.setdefault(("both", i, i), self.partners[i])
+        saved = dict.fromkeys(pairs, 0)
+        for pair in pairs:
+            saved[root(pair)] += 1
+        for pair in costs.values():
+            saved[root(pair)] -= 1
+        for pair in pairs:
+            if saved[root(pair)] <= 0:
+                del self.partners[pair[0]], self.partners[pair[1]]
+
+    def _operands_of(self, pair: Pair) -> Iterator[Pair]:
+        return zip(*([self.same[a] for a in self.aligned[i]] for i in pair), strict=True)
 
 
 class _Rebuilt:
-    """A block anew. A value is the same in both lanes, or meant in the low one alone, or one of two in a vector."""
+    """The block anew. A value has the same in both lanes, is one of two in a vector, or right in the low lane alone."""
 
-    def __init__(self, pairing: "Pairing") -> None:
-        self.pairing = pairing
-        self.old, self.block = pairing.block, Block()
-        self.done: dict[int, int] = {}  # base -> place of its vector
-        self.low: set[int] = set()  # places whose high lane means nothing
-        old = self.old
+    def __init__(self, pairs: _Pairs) -> None:
+        self.pairs, self.old, self.block = pairs, pairs.block, Block()
+        self._places: dict[int, int] = {}  # where the vector is that has an old value
+        self._low: set[int] = set()  # new places whose high lanes mean nothing
         for i in self._order():
             self._rebuild(i)
-        for text, place in old.stores:
-            self.block.stores.append((text, self._both(place)))
-        for place in old.fine:
-            base = pairing.base[place]
-            if base in pairing.partner:
-                self.block.require(self.done[base])
-            else:
-                self.block.require(self._both(place))
+        self.block.stores = [(text, self._both(i)) for text, i in self.old.stores]
+        for i in self.old.fine:
+            self.block.require(self._places[i] if i in pairs.partners else self._both(i))
 
-    def _order(self):
-        pairing = self.pairing
-        seen, order = set(), []
-        members = lambda i: pairing.partner.get(i, (i,))  # noqa
-        stack = [(pairing.base[i], False) for i in (*(k for _, k in self.old.stores), *self.old.fine)]
+    def _order(self) -> list[int]:
+        """Old operations, one of each pair, behind what they need."""
+        partners, operands = self.pairs.partners, self.pairs.operands
+        seen, order = set[int](), list[int]()
+        stack = [(i, False) for i in self.pairs.results]
         while stack:
             i, ready = stack.pop()
-            first = members(i)[0]
+            together = partners.get(i, (i,))
             if ready:
-                order.append(first)
-                continue
-            if first in seen:
-                continue
-            seen.add(first)
-            stack.append((first, True))
-            stack.extend((a, False) for m in members(first) for a in pairing.operands[m])
+                order.append(i)
+            elif together[0] not in seen:
+                seen.add(together[0])
+                stack.append((together[0], True))
+                stack.extend((a, False) for k in together for a in operands[k])
         return order
 
-    def _cast(self, place, kind):
-        node = self.block.nodes[place]
-        if node.op.kind is kind:
-            return place
-        if node.op in _ALIASES and self.block.nodes[node.arguments[0]].op.kind is kind:
-            return node.arguments[0]
-        return self.block.add(Op.REAL if kind is Kind.REAL else Op.BITS, place)
+    def _rebuild(self, i: int) -> None:
+        node, pairs, block, labels = self.old.nodes[i], self.pairs, self.block, self.old.labels
+        if i in pairs.partners:
+            low, high = pairs.partners[i]
+            arguments = [self._vector(a, b) for a, b in zip(pairs.aligned[low], pairs.aligned[high], strict=True)]
+            self._places[low] = self._places[high] = block.add(node.op, *arguments, number=node.number)
+            if low in labels and high in labels:
+                block.name(self._places[low], f"{labels[low]}_and_{labels[high]}")
+            return
+        arguments = [self._single(a) for a in node.arguments]
+        self._places[i] = block.add(node.op, *arguments, number=node.number, text=node.text)
+        if any(self._is_low(a) for a in node.arguments):
+            self._low.add(self._places[i])
+        if i in labels:
+            block.name(self._places[i], labels[i])
 
-    def _kind(self, place):
-        return self.old.nodes[place].op.kind
+    def _lane(self, i: int) -> int:
+        return int(i in self.pairs.partners and self.pairs.partners[i][1] == i)
 
-    def _pair(self, a, i, b, j, kind):
-        op = Op.PAIR
-        if kind is Kind.MASK:
-            op = Op.PAIR_MASKS
-        else:
-            a, b = self._cast(a, Kind.REAL), self._cast(b, Kind.REAL)
-        place = self.block.add(op, a, b, number=i + 2 * j)
-        return place if kind is Kind.MASK else self._cast(place, kind)
+    def _is_low(self, old: int) -> bool:
+        i = self.pairs.same[old]
+        return self._places[i] in self._low or (i in self.pairs.partners and self._lane(i) == 0)
 
-    def _single(self, old):
-        """Place of what is right at least in the low lane."""
-        base, kind = self.pairing.base[old], self._kind(old)
-        pair = self.pairing.partner.get(base)
-        if pair is not None and pair[1] == base:
-            return self._both(old)
-        return self._cast(self.done[base], kind)
+    def _single(self, old: int) -> int:
+        """The place of a value, right at least in the low lane."""
+        i = self.pairs.same[old]
+        return self._both(old) if self._lane(i) else self._of_kind(self._places[i], self.old.nodes[old].op.kind)
 
-    def _alone(self, old):
-        base = self.pairing.base[old]
-        return base in self.pairing.partner and self.pairing.partner[base][0] == base or self.done[base] in self.low
+    def _both(self, old: int) -> int:
+        """The place of a value that is the same in both lanes."""
+        i, kind = self.pairs.same[old], self.old.nodes[old].op.kind
+        if i in self.pairs.partners or self._places[i] in self._low:
+            return self._brought(i, i, kind)
+        return self._of_kind(self._places[i], kind)
 
-    def _both(self, old):
-        base, kind = self.pairing.base[old], self._kind(old)
-        pair, place = self.pairing.partner.get(base), self._cast(self.done[base], kind)
-        if pair is not None:
-            lane = int(pair[1] == base)
-            return self._pair(place, lane, place, lane, kind)
-        if self.done[base] in self.low:
-            return self._pair(place, 0, place, 0, kind)
-        return place
-
-    def _vector(self, left, right):
-        pairing, kind = self.pairing, self._kind(left)
-        i, j = pairing.base[left], pairing.base[right]
+    def _vector(self, left: int, right: int) -> int:
+        """The place of a vector of two old values."""
+        kind, i, j = self.old.nodes[left].op.kind, self.pairs.same[left], self.pairs.same[right]
         if i == j:
             return self._both(left)
-        a, b = self.old.nodes[i], self.old.nodes[j]
-        if a.op in _CONSTANTS and a.op is b.op:
-            return self._cast(self.block.add(a.op, number=a.number, second=b.number), kind)
-        if pairing.partner.get(i) == (i, j):
-            return self._cast(self.done[i], kind)
-        lanes = [int(k in pairing.partner and pairing.partner[k][1] == k) for k in (i, j)]
-        x, y = self._cast(self.done[i], kind), self._cast(self.done[j], kind)
-        return self._pair(x, lanes[0], y, lanes[1], kind)
+        if self.pairs.partners.get(i) == (i, j):
+            return self._of_kind(self._places[i], kind)
+        low, high = self.old.nodes[i], self.old.nodes[j]
+        if low.op in _CONSTANTS and low.op is high.op:
+            return self._of_kind(self.block.add(low.op, number=low.number, second=high.number), kind)
+        return self._brought(i, j, kind)
 
-    def _rebuild(self, i):
-        node, pairing, block = self.old.nodes[i], self.pairing, self.block
-        pair = pairing.partner.get(i)
-        if pair is None:
-            arguments = [self._single(a) for a in node.arguments]
-            self.done[i] = block.add(node.op, *arguments, number=node.number, text=node.text)
-            if any(self._alone(a) for a in node.arguments):
-                self.low.add(self.done[i])
-            if i in self.old.labels:
-                block.name(self.done[i], self.old.labels[i])
-            return
-        low, high = pair
-        arguments = [self._vector(a, b) for a, b in zip(pairing.order[low], pairing.order[high])]
-        self.done[low] = self.done[high] = block.add(node.op, *arguments, number=node.number)
-        if low in self.old.labels and high in self.old.labels:
-            block.name(self.done[low], f"{self.old.labels[low]}_and_{self.old.labels[high]}")
+    def _brought(self, i: int, j: int, kind: Kind) -> int:
+        """Two old values brought together from wherever they lie."""
+        lanes, found = self._lane(i) + 2 * self._lane(j), (self._places[i], self._places[j])
+        if kind is Kind.MASK:
+            return self.block.add(Op.PAIR_MASKS, *found, number=lanes)
+        real = [self._of_kind(place, Kind.REAL) for place in found]
+        return self._of_kind(self.block.add(Op.PAIR, *real, number=lanes), kind)
 
-
-class Pairing:
-    def __init__(self, block: Block) -> None:
-        self.block = block
-        nodes = block.nodes
-        self.base = []
-        for i, node in enumerate(nodes):
-            self.base.append(self.base[node.arguments[0]] if node.op in _ALIASES else i)
-        self.operands = [[self.base[a] for a in node.arguments] for node in nodes]
-        needed = set()
-        stack = [self.base[i] for i in (*(k for _, k in block.stores), *block.fine)]
-        while stack:
-            i = stack.pop()
-            if i not in needed:
-                needed.add(i)
-                stack.extend(self.operands[i])
-        self.needed = sorted(needed)
-        self.computed = [i for i in self.needed if nodes[i].op not in _LEAVES]
-        self.users = {i: [] for i in self.needed}
-        for i in self.computed:
-            for a in set(self.operands[i]):
-                self.users[a].append(i)
-        self.above = {}  # bits of what a node needs, itself included
-        for i in self.needed:
-            bits = 1 << i
-            for a in self.operands[i]:
-                bits |= self.above[a]
-            self.above[i] = bits
-        self.below = {i: 1 << i for i in self.needed}
-        for i in reversed(self.needed):
-            for u in self.users[i]:
-                self.below[i] |= self.below[u]
-        from springline.codegen.kernel.schedule import _LATENCY
-        import os
-        self.latency = {i: 0 if nodes[i].op in _LEAVES else _LATENCY.get(nodes[i].op, 1) for i in self.needed}
-        self.depth, self.height = {}, {}  # cycles to its end, and from there on
-        for i in self.needed:
-            self.depth[i] = max((self.depth[a] for a in self.operands[i]), default=0) + self.latency[i]
-        for i in reversed(self.needed):
-            self.height[i] = max((self.height[u] + self.latency[u] for u in self.users[i]), default=0)
-        self.longest = max(self.depth.values()) * float(os.environ.get("TOL", "1.0"))
-        self.partner = {}  # node -> (its pair (low, high))
-        self.pairs = []
-        self.order = {}  # node -> arguments as aligned
-        h = {i: hash((nodes[i].op if nodes[i].op not in _CONSTANTS else 0)) for i in self.needed}
-        self.shapes = [h]
-        for _ in range(_DEPTH):
-            g = {}
-            for i in self.needed:
-                n = nodes[i]
-                if n.op in _LEAVES:
-                    g[i] = h[i]
-                    continue
-                below = [h[a] for a in self.operands[i]]
-                if n.op in COMMUTATIVE:
-                    below.sort()
-                g[i] = hash((n.op, n.number, *below))
-            h = g
-            self.shapes.append(h)
-
-    def similar(self, i, j):
-        if i == j:
-            return _DEPTH + 1
-        if self.partner.get(i) == (i, j) and i in self.partner:
-            return _DEPTH + 2
-        k = 0
-        while k <= _DEPTH and self.shapes[k][i] == self.shapes[k][j]:
-            k += 1
-        return k
-
-    def _independent(self, i, j):
-        return not (self.above[i] >> j & 1 or self.above[j] >> i & 1)
-
-    def _late(self, i, j):
-        """Whether both together would make the longest way longer."""
-        return max(self.depth[i], self.depth[j]) + max(self.height[i], self.height[j]) > self.longest
-
-    def _delay(self, i, j):
-        depth, height, latency = self.depth, self.height, self.latency
-        work = []
-        for one, other in ((i, j), (j, i)):
-            if depth[one] < depth[other]:
-                depth[one] = depth[other]
-                work.append(one)
-        while work:
-            k = work.pop()
-            for u in self.users[k]:
-                for m in self.partner.get(u, (u,)):
-                    if depth[m] < depth[k] + latency[m]:
-                        depth[m] = depth[k] + latency[m]
-                        work.append(m)
-        for one, other in ((i, j), (j, i)):
-            if height[one] < height[other]:
-                height[one] = height[other]
-                work.append(one)
-        while work:
-            k = work.pop()
-            for a in self.operands[k]:
-                for m in self.partner.get(a, (a,)):
-                    if height[m] < height[k] + latency[k]:
-                        height[m] = height[k] + latency[k]
-                        work.append(m)
-
-    def _merge(self, i, j):
-        above, below = self.above[i] | self.above[j], self.below[i] | self.below[j]
-        up, down = above, below
-        bits = below
-        while bits:
-            low = bits & -bits
-            self.above[low.bit_length() - 1] |= above
-            bits ^= low
-        bits = above
-        while bits:
-            low = bits & -bits
-            self.below[low.bit_length() - 1] |= below
-            bits ^= low
-
-    def walk(self, i, j):
-        stack = [(self.base[i], self.base[j])]
-        nodes = self.block.nodes
-        while stack:
-            i, j = stack.pop()
-            if i == j or i in self.partner or j in self.partner:
-                continue
-            a, b = nodes[i], nodes[j]
-            if a.op is not b.op or a.op in _LEAVES or a.number != b.number or not self._independent(i, j) or self._late(i, j):
-                continue
-            left, right = list(a.arguments), list(b.arguments)
-            if a.op in COMMUTATIVE:
-                s = self.similar
-                straight = s(self.base[left[0]], self.base[right[0]]) + s(self.base[left[1]], self.base[right[1]])
-                crossed = s(self.base[left[0]], self.base[right[1]]) + s(self.base[left[1]], self.base[right[0]])
-                if crossed > straight:
-                    right.reverse()
-            self._merge(i, j)
-            self.partner[i] = self.partner[j] = (i, j)
-            self._delay(i, j)
-            self.pairs.append((i, j))
-            self.order[i], self.order[j] = left, right
-            stack.extend((self.base[x], self.base[y]) for x, y in reversed(list(zip(left, right))))
-
-    def by_shape(self):
-        for depth in (_DEPTH, 6, 4):
-            groups = {}
-            for i in reversed(self.computed):
-                if i not in self.partner:
-                    groups.setdefault(self.shapes[depth][i], []).append(i)
-            for members in groups.values():
-                members.reverse()
-                free = [m for m in members if m not in self.partner]
-                k = 0
-                while k + 1 < len(free):
-                    before = len(self.pairs)
-                    self.walk(free[k], free[k + 1])
-                    k += 2 if len(self.pairs) > before else 1
-
-    # cost
-    def _vector(self, i, j):
-        """Demand of a vector of i and j."""
-        nodes = self.block.nodes
-        if i == j:
-            if i in self.partner and nodes[i].op not in _LEAVES:
-                yield ("both", i), 1
-            return
-        if nodes[i].op in _CONSTANTS and nodes[j].op in _CONSTANTS:
-            return
-        if self.partner.get(i) == (i, j):
-            return
-        loads = (nodes[i].op is Op.INPUT) + (nodes[j].op is Op.INPUT)
-        yield ("pack", i, j), 1 + (loads == 2)
-
-    def _single(self, i):
-        if i in self.partner and self.partner[i][1] == i:
-            yield ("both", i), 1
-
-    def demands(self, i) -> Iterator:
-        """Of a node, or of a pair named by its low node."""
-        pair = self.partner.get(i)
-        yield ("op", pair or i), 1
-        if pair is not None:
-            for x, y in zip(self.order[pair[0]], self.order[pair[1]]):
-                yield from self._vector(self.base[x], self.base[y])
-        else:
-            for a in self.operands[i]:
-                yield from self._single(a)
-
-    def prune(self):
-        stored = [self.base[i] for _, i in self.block.stores]
-        count, price = Counter(), {}
-
-        def put(i, sign):
-            delta = 0
-            for key, cost in self.demands(i):
-                count[key] += sign
-                if sign > 0 and count[key] == 1:
-                    delta += cost
-                elif sign < 0 and count[key] == 0:
-                    delta -= cost
-            return delta
-
-        def affected(pairs):
-            found = set()
-            for i, j in pairs:
-                for k in (i, j):
-                    found.add(k)
-                    found.update(self.users[k])
-            return found
-
-        def toggle(pairs, on):
-            nodes = affected(pairs)
-            delta = sum(put(i, -1) for i in nodes)
-            for i, j in pairs:
-                # stores
-                for k in (i, j):
-                    delta += (1 if on else -1) * (k in in_store)
-                if on:
-                    self.partner[i] = self.partner[j] = (i, j)
-                else:
-                    del self.partner[i], self.partner[j]
-            return delta + sum(put(i, 1) for i in nodes)
-
-        in_store = set(stored)
-        self.cost = sum(put(i, 1) for i in self.computed) + sum(k in self.partner for k in in_store)
-        self.before = len(self.computed)
-        self.first = (self.cost, len(self.pairs))
-        active = set(self.pairs)
-        for _ in range(6):
-            changed = False
-            # components
-            links = {p: p for p in active}
-
-            def root(p):
-                while links[p] != p:
-                    links[p] = links[links[p]]
-                    p = links[p]
-                return p
-
-            for p in active:
-                for x, y in zip(self.order[p[0]], self.order[p[1]]):
-                    q = self.partner.get(self.base[x])
-                    if q == (self.base[x], self.base[y]):
-                        links[root(p)] = root(q)
-            components = {}
-            for p in self.pairs:
-                if p in active:
-                    components.setdefault(root(p), []).append(p)
-            for members in components.values():
-                delta = toggle(members, False)
-                if delta <= 0:
-                    self.cost += delta
-                    active.difference_update(members)
-                    changed = True
-                else:
-                    toggle(members, True)
-            for p in self.pairs:
-                on = p not in active
-                delta = toggle([p], on)
-                if delta < 0 or (delta == 0 and not on):
-                    self.cost += delta
-                    (active.add if on else active.discard)(p)
-                    changed = True
-                else:
-                    toggle([p], not on)
-            if not changed:
-                break
-        self.active = active
+    def _of_kind(self, place: int, kind: Kind) -> int:
+        if self.block.nodes[place].op.kind is kind:
+            return place
+        return self.block.add(Op.REAL if kind is Kind.REAL else Op.BITS, place)

@@ -114,11 +114,11 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
         files = {**shared, **casadi_c.kernel_header(program, start)}
     else:
         width = options.width or toolchain.native_vector_width(options.compiler)
-
-        alone = options.groups == 1 and options.packs == 1  # one vector waits as one lane does
+        if options.alone:
+            width = min(max(width, 2), 4)
 
         def shape(evaluation: int, step: int) -> Shape:
-            best = what_pays(1 if alone else width, sampled, evaluation, step)
+            best = what_pays(1 if options.alone else width, sampled, evaluation, step)
             return replace(
                 best,
                 span=options.span or best.span,

@@ -64,7 +64,6 @@ typedef __typeof__((sl_v){0} < (sl_v){0}) sl_m;
 #define SL_EACH_TWO(x, y) {x, y, x, y}
 #elif SL_W == 8
 #define SL_EACH(x) {x, x, x, x, x, x, x, x}
-#define SL_EACH_TWO(x, y) {x, y, x, y, x, y, x, y}
 #else
 #define SL_EACH(x) {x, x, x, x, x, x, x, x, x, x, x, x, x, x, x, x}
 #endif
@@ -243,8 +242,6 @@ static inline sl_v slv_sqrt(sl_v x) {
 #define slv_pair(a, i, b, j) SL_SHUFFLE(a, b, i, 2 + j)
 #elif SL_W == 4
 #define slv_pair(a, i, b, j) SL_SHUFFLE(a, b, i, 4 + j, 2 + i, 6 + j)
-#elif SL_W == 8
-#define slv_pair(a, i, b, j) SL_SHUFFLE(a, b, i, 8 + j, 2 + i, 10 + j, 4 + i, 12 + j, 6 + i, 14 + j)
 #endif
 #define slv_pair_masks(a, i, b, j) ((sl_m)slv_pair((sl_v)(a), i, (sl_v)(b), j))
 
