@@ -56,10 +56,12 @@ class KernelOptions:
                 whole(name, getattr(self, name), 1, _MOST)
         if self.width is not None and self.width & (self.width - 1):
             raise ValueError(f"width is {self.width}, expected a power of two")
-        if self.alone and (self.width not in (None, 2, 4) or self.groups not in (None, 1)):
-            raise ValueError(f"width is {self.width}, groups {self.groups}, expected 2 or 4 and 1 for a run alone")
+        if self.alone and self.width not in (None, 2, 4):
+            raise ValueError(f"width is {self.width}, expected 2 or 4 for a run alone")
+        if self.alone and self.groups not in (None, 1):
+            raise ValueError(f"groups is {self.groups}, expected 1 for a run alone")
         if self.paired and not self.alone:
-            raise ValueError("paired is True, expected it where alone is")
+            raise ValueError("paired is True, expected alone to be, too")
 
 
 ONE_RUN = KernelOptions(alone=True)
