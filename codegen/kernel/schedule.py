@@ -131,4 +131,3 @@ def _needed(wanted: Sequence[int], alias: Sequence[int], operands: Sequence[Sequ
             found.add(i)
             stack.extend(operands[i])
     return sorted(found)
-

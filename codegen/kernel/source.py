@@ -129,9 +129,7 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
 
         emission = lanes.emit(program, spec.constants)
         steps = print_steps(emission.values, sampled, shape)
-        start = preamble(
-            program, steps.shape, width=width, sampled=sampled, sizes=emission.sizes, alone=options.alone
-        )
+        start = preamble(program, steps.shape, width=width, sampled=sampled, sizes=emission.sizes, alone=options.alone)
         parameters = emission.tunable
         files = {**shared, "kernel.h": f"{start}\n{emission.text}\n{steps.text}"}
     return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)

@@ -83,11 +83,12 @@ LANES = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("options", "tunable"),
-    LANES,
-    ids=[f"W{o.width}G{o.groups}P{o.packs}{'-alone' * o.alone}{''.join(o.flags or ())}{'-baked' * bool(t)}" for o, t in LANES],
-)
+def name_of(options: KernelOptions, tunable: tuple[str, ...] | None) -> str:
+    shape = f"W{options.width}G{options.groups}P{options.packs}{'-alone' * options.alone}"
+    return f"{shape}{''.join(options.flags or ())}{'-baked' * bool(tunable)}"
+
+
+@pytest.mark.parametrize(("options", "tunable"), LANES, ids=[name_of(*each) for each in LANES])
 def test_lanes_equal_casadi(
     options: KernelOptions,
     tunable: tuple[str, ...] | None,

@@ -98,7 +98,8 @@ def test_nothing_is_a_block_too() -> None:
 
 def test_what_costs_more_to_bring_together_than_it_saves_is_left() -> None:
     block = Block()
-    block.stores = [(f"next[{k}][@]", block.sum(block.load(f"x[{k}][@]"), block.load(f"x[{k + 2}][@]"))) for k in (0, 1)]
+    x = [block.load(f"x[{k}][@]") for k in range(4)]
+    block.stores = [(f"next[{k}][@]", block.sum(x[k], x[k + 2])) for k in (0, 1)]
     assert counts(paired(block, 2)) == counts(block)
 
 
@@ -125,7 +126,8 @@ def test_runs_alone_have_the_bits_of_runs_together(structure: Structure, sampled
     def simulated(options: KernelOptions) -> Sequence[bytes]:
         runs = kernel(KernelSpec(structure, sampled, None, (), options)).run(values, steps)
         assert runs.trajectory is not None and np.isfinite(runs.trajectory).all()
-        return [getattr(runs, name).tobytes() for name in ("trajectory", "final_state", "metrics", "status", "end_time")]
+        names = ("trajectory", "final_state", "metrics", "status", "end_time")
+        return [getattr(runs, name).tobytes() for name in names]
 
     together = simulated(KernelOptions(engine="casadi", flags=("-O0",)))
     assert simulated(KernelOptions(alone=True, paired=True, flags=("-O0",))) == together
