@@ -65,6 +65,8 @@ class Op(Enum):
     IF = ("if", Kind.REAL)  # mask ? a : 0.0
     TRUE = ("true", Kind.REAL)  # mask ? 1.0 : 0.0
     PICK = ("pick", Kind.REAL)  # b where the top bit of the first argument is set, else a
+    PAIR = ("pair", Kind.REAL)  # of vectors of two: a lane of each
+    PAIR_MASKS = ("pair_masks", Kind.MASK)
     REAL = ("real", Kind.REAL)
     BITS = ("bits", Kind.BITS)
     BIT_AND = ("bit_and", Kind.BITS)

@@ -39,12 +39,14 @@ class Primitive:
 
     number  of a constant, a shift, a bound
     text    of what is loaded, its C expression
+    second  of a constant, the number in the other lane, if it is another
     """
 
     op: Op
     arguments: tuple[int, ...] = ()
     number: float | int = 0
     text: str = ""
+    second: float | int | None = None
 
 
 class Block:
@@ -63,13 +65,21 @@ class Block:
         self._places: dict[object, int] = {}
         self._named: set[str] = set()
 
-    def add(self, op: Op, *arguments: int, number: float | int = 0, text: str = "") -> int:
+    def add(
+        self,
+        op: Op,
+        *arguments: int,
+        number: float | int = 0,
+        text: str = "",
+        second: float | int | None = None,
+    ) -> int:
         """The place of an operation, which may be there already."""
         ordered = tuple(sorted(arguments)) if op in COMMUTATIVE else arguments
-        key = (op, ordered, number, math.copysign(1.0, number), text)
+        other = number if second is None else second
+        key = (op, ordered, number, math.copysign(1.0, number), text, other, math.copysign(1.0, other))
         if key not in self._places:
             self._places[key] = len(self.nodes)
-            self.nodes.append(Primitive(op, arguments, number, text))
+            self.nodes.append(Primitive(op, arguments, number, text, second))
         return self._places[key]
 
     @property

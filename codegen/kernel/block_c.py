@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from springline.codegen.elementary import INFIX, Kind, Op
 from springline.codegen.kernel.block import Block, Primitive
+from springline.codegen.kernel.schedule import aliases
 from springline.codegen.program import constant_expression
 
 
@@ -20,22 +21,28 @@ class Constants:
         self._reals: dict[str, int] = {}
         self._bits: dict[str, int] = {}
 
-    def real(self, value: float, group: str) -> str:
-        """C expression of a number."""
-        return f"sl_reals[{group}][{self._reals.setdefault(_static(value), len(self._reals))}]"
+    def real(self, value: float, second: float | None, group: str) -> str:
+        """C expression of a number, and of another in a second lane."""
+        entry = _entry(_static(value), None if second is None else _static(second))
+        return f"sl_reals[{group}][{self._reals.setdefault(entry, len(self._reals))}]"
 
-    def bits(self, value: int, group: str) -> str:
+    def bits(self, value: int, second: int | None, group: str) -> str:
         """C expression of 64 bits."""
-        return f"sl_words[{group}][{self._bits.setdefault(f'UINT64_C({value:#x})', len(self._bits))}]"
+        entry = _entry(f"UINT64_C({value:#x})", None if second is None else f"UINT64_C({second:#x})")
+        return f"sl_words[{group}][{self._bits.setdefault(entry, len(self._bits))}]"
 
     def text(self, groups: int) -> list[str]:
         """The definitions."""
         lines = []
         for kind, name, values in (("sl_v", "sl_reals", self._reals), ("sl_b", "sl_words", self._bits)):
-            entries = "".join(f"\n  SL_EACH({value})," for value in values)
+            entries = "".join(f"\n  {value}," for value in values)
             size = f"{name}[SL_G][{len(values)} + 1]"
             lines += [f"extern {kind} {size};", f"{kind} {size} = {{{', '.join(['{' + entries + '}'] * groups)}}};\n"]
         return lines
+
+
+def _entry(value: str, second: str | None) -> str:
+    return f"SL_EACH({value})" if second is None else f"SL_EACH_TWO({value}, {second})"
 
 
 def _static(value: float) -> str:
@@ -53,9 +60,7 @@ def statements(
     groups  the index of each, as C has it
     """
     nodes = block.nodes
-    same: list[int] = []  # real and bits are other names of the same
-    for i, node in enumerate(nodes):
-        same.append(same[node.arguments[0]] if node.op in (Op.REAL, Op.BITS) else i)
+    same = aliases(block)
     scheduled, fine = set(order), {same[i] for i in block.fine}
     stores: dict[int, list[tuple[str, int]]] = {}
     for place, i in block.stores:
@@ -69,9 +74,9 @@ def statements(
         if node.op is Op.INPUT:
             return node.text.replace("@", g)
         if node.op is Op.REAL_CONSTANT:
-            return constants.real(float(node.number), g)
+            return constants.real(float(node.number), node.second, g)
         if node.op is Op.BITS_CONSTANT:
-            return constants.bits(int(node.number), g)
+            return constants.bits(int(node.number), None if node.second is None else int(node.second), g)
         if node.op in (Op.REAL, Op.BITS):
             return f"slv_{node.op.value[0]}({value(node.arguments[0], g)})"
         return block.labels.get(i, f"a{i}") + suffix(g)
@@ -100,6 +105,9 @@ def _expression(node: Primitive, operands: Sequence[str]) -> str:
         return f"{operands[0]} {INFIX[node.op]} {operands[1]}"
     if node.op is Op.NEG:
         return f"-{operands[0]}"
+    if node.op in (Op.PAIR, Op.PAIR_MASKS):
+        lanes = divmod(int(node.number), 2)
+        return f"slv_{node.op.value[0]}({operands[0]}, {lanes[1]}, {operands[1]}, {lanes[0]})"
     if node.op is Op.BELOW:
         return f"slv_below({operands[0]}, UINT64_C({int(node.number):#x}))"
     return f"slv_{node.op.value[0]}({', '.join(operands)})"

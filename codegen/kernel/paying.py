@@ -17,12 +17,14 @@ class Shape:
     groups  vectors that each statement is printed for, side by side
     packs   packs of groups that go through time in turn, block by block
     alive   values of a group from which on the order saves registers
+    paired  whether operations that joints have in common lie in the lanes of one vector, where a run is alone
     """
 
     span: Span
     groups: int
     packs: int
     alive: int
+    paired: bool = False
 
 
 # By lanes of a vector, each without and with sampled control; benchmarks/block_shapes.py measures what others take.
@@ -34,24 +36,24 @@ class Shape:
 _SMALL: dict[int, tuple[Shape, Shape]] = {
     8: (Shape("step", 1, 2, 28), Shape("step", 2, 2, 14)),
     2: (Shape("evaluation", 2, 1, 6), Shape("step", 1, 2, 12)),
-    1: (Shape("step", 1, 1, 12), Shape("step", 1, 1, 12)),
+    1: (Shape("step", 1, 1, 12, True), Shape("step", 1, 1, 12, True)),
 }
 # Many stages of small evaluations: as one block, compilers take more than their share of time.
 _LONG: dict[int, tuple[Shape, Shape]] = {
     8: (Shape("evaluation", 2, 1, 14), Shape("evaluation", 2, 2, 14)),
     2: (Shape("evaluation", 2, 1, 6), Shape("evaluation", 2, 2, 6)),
-    1: (Shape("evaluation", 1, 1, 12), Shape("evaluation", 1, 1, 12)),
+    1: (Shape("evaluation", 1, 1, 12, True), Shape("evaluation", 1, 1, 12, True)),
 }
 # Few stages of large evaluations.
 _WIDE: dict[int, tuple[Shape, Shape]] = {
     8: (Shape("step", 1, 2, 28), Shape("step", 1, 2, 28)),
     2: (Shape("evaluation", 1, 2, 12), Shape("evaluation", 1, 2, 12)),
-    1: (Shape("step", 1, 1, 12), Shape("step", 1, 1, 12)),
+    1: (Shape("step", 1, 1, 12, True), Shape("step", 1, 1, 12, True)),
 }
 _LONG_AND_WIDE: dict[int, tuple[Shape, Shape]] = {
     8: (Shape("evaluation", 1, 2, 28), Shape("evaluation", 1, 1, 28)),
     2: (Shape("evaluation", 1, 2, 12), Shape("evaluation", 1, 2, 12)),
-    1: (Shape("evaluation", 1, 1, 12), Shape("evaluation", 1, 1, 12)),
+    1: (Shape("evaluation", 1, 1, 12, True), Shape("evaluation", 1, 1, 12, True)),
 }
 MOST = 4000
 """Operations of a step, or of the signals of its times, beyond which a block of them is long."""

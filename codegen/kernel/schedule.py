@@ -21,7 +21,7 @@ _MULTIPLIER, _ADDER, _SHUFFLER, _LOGIC = range(4)
 _PORTS = {
     **dict.fromkeys((Op.MUL, Op.DIV, Op.SQRT), _MULTIPLIER),
     **dict.fromkeys((Op.ADD, Op.SUB, Op.FMIN, Op.FMAX, Op.LT, Op.LE, Op.EQ, Op.NE, Op.BELOW), _ADDER),
-    **dict.fromkeys((Op.SHIFT_LEFT, Op.SHIFT_RIGHT), _SHUFFLER),
+    **dict.fromkeys((Op.SHIFT_LEFT, Op.SHIFT_RIGHT, Op.PAIR, Op.PAIR_MASKS), _SHUFFLER),
 }
 _LATENCY = {
     **dict.fromkeys((Op.MUL, Op.ADD, Op.SUB), 3),
@@ -32,6 +32,19 @@ _LATENCY = {
 _SLOTS = 4
 _PER_PORT = 2
 _SEEN = 64  # of what is ready, so many are looked at for one that ends lives
+
+
+def latency(op: Op) -> int:
+    """Cycles until the result of an operation is there."""
+    return 0 if op in LEAVES else _LATENCY.get(op, 1)
+
+
+def aliases(block: Block) -> list[int]:
+    """For each primitive that whose value it is another name of, itself where it is none."""
+    same: list[int] = []
+    for i, node in enumerate(block.nodes):
+        same.append(same[node.arguments[0]] if node.op in (Op.REAL, Op.BITS) else i)
+    return same
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,18 +61,18 @@ def scheduled(block: Block, most: int) -> Order:
     most  values alive from which on operations are preferred that end lives
     """
     nodes = block.nodes
-    alias = _aliases(block)
+    alias = [-1 if nodes[i].op in LEAVES else i for i in aliases(block)]
     operands = [sorted({alias[a] for a in node.arguments} - {-1}) for node in nodes]
     needed = _needed([*(place for _, place in block.stores), *block.fine], alias, operands)
     users: dict[int, list[int]] = {i: [] for i in needed}
     for i in needed:
         for a in operands[i]:
             users[a].append(i)
-    latency = {i: _LATENCY.get(nodes[i].op, 1) for i in needed}
+    cycles = {i: latency(nodes[i].op) for i in needed}
     port = {i: _PORTS.get(nodes[i].op, _LOGIC) for i in needed}
     rank: dict[int, int] = {}  # less is sooner: minus the longest way to the end
     for i in reversed(needed):
-        rank[i] = min((rank[user] for user in users[i]), default=0) - latency[i]
+        rank[i] = min((rank[user] for user in users[i]), default=0) - cycles[i]
 
     waiting = {i: len(operands[i]) for i in needed}
     uses = {i: len(users[i]) for i in needed}
@@ -100,7 +113,7 @@ def scheduled(block: Block, most: int) -> Order:
             alive += uses[i] > 0
             peak = max(peak, alive)
             for user in users[i]:
-                there[user] = max(there[user], cycle + latency[i])
+                there[user] = max(there[user], cycle + cycles[i])
                 waiting[user] -= 1
                 if waiting[user] == 0:
                     heapq.heappush(coming, (there[user], user))
@@ -118,14 +131,3 @@ def _needed(wanted: Sequence[int], alias: Sequence[int], operands: Sequence[Sequ
             found.add(i)
             stack.extend(operands[i])
     return sorted(found)
-
-
-def _aliases(block: Block) -> list[int]:
-    """For each primitive that whose value it is another name of: itself, or -1 for what is loaded or constant."""
-    alias: list[int] = []
-    for i, node in enumerate(block.nodes):
-        if node.op in (Op.REAL, Op.BITS):
-            alias.append(alias[node.arguments[0]])
-        else:
-            alias.append(-1 if node.op in LEAVES else i)
-    return alias

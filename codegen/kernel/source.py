@@ -41,7 +41,9 @@ class KernelSource:
         return hashlib.sha256(json.dumps([self.files, self.parameters]).encode()).hexdigest()
 
 
-def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes: Mapping[str, int]) -> str:
+def preamble(
+    program: Program, shape: Shape, *, width: int, sampled: bool, sizes: Mapping[str, int], alone: bool = False
+) -> str:
     """The macros and types that every kernel.h starts with; `sizes`: parameters, run, uniform and varying values."""
     memory, sliding = program.size("z"), len(program.system.sliding)
     channels = sum(len(table.channels) for table in program.system.tables)
@@ -70,6 +72,7 @@ def preamble(program: Program, shape: Shape, *, width: int, sampled: bool, sizes
     return f"""#define SL_W {width}
 #define SL_G {shape.groups}
 #define SL_PACKS {shape.packs}
+#define SL_ALONE {int(alone)}
 #define SL_SAMPLED {int(sampled)}
 #define SL_NZ {memory}
 #define SL_SLIDING {sliding}
@@ -113,21 +116,22 @@ def print_kernel(program: Program, spec: KernelSpec) -> KernelSource:
         files = {**shared, **casadi_c.kernel_header(program, start)}
     else:
         width = options.width or toolchain.native_vector_width(options.compiler)
-
-        alone = options.groups == 1 and options.packs == 1  # one vector waits as one lane does
+        if options.alone:
+            width = min(max(width, 2), 4)
 
         def shape(evaluation: int, step: int) -> Shape:
-            best = what_pays(1 if alone else width, sampled, evaluation, step)
+            best = what_pays(1 if options.alone else width, sampled, evaluation, step)
             return replace(
                 best,
                 span=options.span or best.span,
                 groups=options.groups or best.groups,
                 packs=options.packs or best.packs,
+                paired=options.alone and (best.paired if options.paired is None else options.paired),
             )
 
         emission = lanes.emit(program, spec.constants)
         steps = print_steps(emission.values, sampled, shape)
-        start = preamble(program, steps.shape, width=width, sampled=sampled, sizes=emission.sizes)
+        start = preamble(program, steps.shape, width=width, sampled=sampled, sizes=emission.sizes, alone=options.alone)
         parameters = emission.tunable
         files = {**shared, "kernel.h": f"{start}\n{emission.text}\n{steps.text}"}
     return KernelSource(tuple(sorted(files.items())), _flags(options), parameters)

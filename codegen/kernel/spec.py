@@ -25,10 +25,12 @@ class KernelOptions:
     """How a kernel is printed and compiled; none of it changes a bit of the results.
 
     engine   "lanes" or "casadi" (the reference, one run at a time, every parameter tunable)
-    width    lanes in a vector, None for the machine's
+    width    lanes in a vector, None for the machine's; a run alone has use for no more than 4
     groups   vectors worked on at once to hide latency, None for what pays
     span     what is printed as one block: "evaluation", "stage" or "step", None for what pays
     packs    so many times width x groups runs go through time side by side, None for what pays
+    alone    one run at a time: all lanes repeat it, or two of its joints lie side by side in them
+    paired   whether joints lie side by side where a run is alone, None for what pays
     flags    optimisation flags, None for the best this machine can do
     compiler  None for the one that is found
     Raises ValueError for an unknown engine, and for counts that no kernel can have.
@@ -39,6 +41,8 @@ class KernelOptions:
     groups: int | None = None
     span: Span | None = None
     packs: int | None = None
+    alone: bool = False
+    paired: bool | None = None
     flags: tuple[str, ...] | None = None
     compiler: Compiler | None = None
 
@@ -52,11 +56,17 @@ class KernelOptions:
                 whole(name, getattr(self, name), 1, _MOST)
         if self.width is not None and self.width & (self.width - 1):
             raise ValueError(f"width is {self.width}, expected a power of two")
+        if self.alone and self.width not in (None, 2, 4):
+            raise ValueError(f"width is {self.width}, expected 2 or 4 for a run alone")
+        if self.alone and self.groups not in (None, 1):
+            raise ValueError(f"groups is {self.groups}, expected 1 for a run alone")
+        if self.paired and not self.alone:
+            raise ValueError("paired is True, expected alone to be, too")
 
 
-ONE_RUN = KernelOptions(width=2, groups=1, packs=1)
-"""For a run by itself: two lanes, the second repeats the first. The idle lane costs nothing, and in vector registers
-the bits of a double are at hand, without a detour through integer registers."""
+ONE_RUN = KernelOptions(alone=True)
+"""For a run by itself. Idle lanes cost nothing, and in vector registers the bits of a double are at hand, without a
+detour through integer registers."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from springline.codegen.kernel.block import Block, Expansion
 from springline.codegen.kernel.block_c import Constants, statements
 from springline.codegen.kernel.loop_values import LoopValues
+from springline.codegen.kernel.pairing import paired
 from springline.codegen.kernel.paying import MOST, Shape
 from springline.codegen.kernel.schedule import scheduled
 from springline.codegen.program import Binding, kept_slopes, literal, updates
@@ -84,15 +85,17 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int, int], S
             define(functions[block.content], block)
         return f"{{kernel_{functions[block.content]}, {tableau.when[stages[0]]}, {gain}}}"
 
-    def begin(name: str, arguments: str, block: Block) -> Sequence[int]:
+    def begin(name: str, arguments: str, block: Block) -> tuple[Block, Sequence[int]]:
+        if chosen.paired:
+            block = paired(block, builder.n)
         order = scheduled(block, chosen.alive)
         counts[name] = len(order.places)
         text.append(f"/* {counts[name]} operations a run, {order.alive} values at once */")
         text.append(f"SL_BLOCK_FUNCTION int kernel_{name}({arguments}) {{")
-        return order.places
+        return block, order.places
 
     def define(name: str, block: Block) -> None:
-        order = begin(name, "SL_BLOCK_ARGUMENTS", block)
+        block, order = begin(name, "SL_BLOCK_ARGUMENTS", block)
         groups = [str(g) for g in range(chosen.groups)]
         masks = [f"ok_{g}" if chosen.groups > 1 else "ok" for g in groups]
         text.extend(f"  sl_m {mask} = slv_yes();" for mask in masks)
@@ -100,7 +103,7 @@ def print_steps(values: LoopValues, sampled: bool, shape: Callable[[int, int], S
         text.append(f"  return slv_all({' & '.join(masks)});\n}}\n")
 
     def define_times(block: Block) -> None:
-        order = begin("times", _TIMES_ARGUMENTS, block)
+        block, order = begin("times", _TIMES_ARGUMENTS, block)
         text.extend(["  sl_m ok = slv_yes();", "  int g;", "  for (g = 0; g < SL_G; g++) {"])
         text.extend(statements(block, order, ["g"], constants, "    "))
         text.append("  }\n  return slv_all(ok);\n}\n")

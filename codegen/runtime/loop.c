@@ -62,6 +62,7 @@
 
 enum {
   SL_PACK = SL_W * SL_G,
+  SL_RUNS = SL_ALONE ? 1 : SL_PACK, /* of a pack, at most; the lanes behind the last repeat it */
   SL_NMETRICS = SL_NJ * SL_METRICS_PER_JOINT,
   SL_BLOCK = (SL_INSTANTS + SL_W - 1) / SL_W * SL_W, /* instants whose uniform signals are evaluated together */
   SL_NPLANT = SL_NX - SL_NZ,
@@ -471,7 +472,7 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
   pack->clock = clock;
   pack->x = pack->states[0];
   pack->next = pack->states[1];
-  pack->lanes = (int)(job->last - first < SL_PACK ? job->last - first : SL_PACK);
+  pack->lanes = (int)(job->last - first < SL_RUNS ? job->last - first : SL_RUNS);
   pack->live = pack->lanes;
   pack->samples = 0;
   for (lane = 0; lane < SL_PACK; lane++) {
@@ -609,7 +610,7 @@ static void run_packs(sl_pack *packs, int count, const sl_job *job) {
  * how many there are.
  */
 __attribute__((visibility("default"))) int64_t springline_layout(int64_t *layout, int64_t room) {
-  static const int64_t sizes[] = {SL_PACK * SL_PACKS, sizeof(sl_job), sizeof(sl_table), SL_NP,       SL_NTABLES,
+  static const int64_t sizes[] = {SL_RUNS * SL_PACKS, sizeof(sl_job), sizeof(sl_table), SL_NP,       SL_NTABLES,
                                   SL_NX,              SL_NMETRICS,    SL_NCOLUMNS,      SL_STATUSES};
   const int64_t count = sizeof sizes / sizeof *sizes;
   int64_t i;
@@ -628,7 +629,7 @@ __attribute__((visibility("default"))) void springline_simulate(const sl_job *jo
   while (first < job->last) {
     int count;
     clock.block[0] = clock.block[1] = -1;
-    for (count = 0; count < SL_PACKS && first < job->last; count++, first += SL_PACK) {
+    for (count = 0; count < SL_PACKS && first < job->last; count++, first += SL_RUNS) {
       load_pack(&packs[count], job, first, &clock);
     }
     run_packs(packs, count, job);

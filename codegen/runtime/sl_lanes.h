@@ -58,8 +58,10 @@ typedef __typeof__((sl_v){0} < (sl_v){0}) sl_m;
 /* an initialiser: x in all lanes */
 #if SL_W == 2
 #define SL_EACH(x) {x, x}
+#define SL_EACH_TWO(x, y) {x, y}
 #elif SL_W == 4
 #define SL_EACH(x) {x, x, x, x}
+#define SL_EACH_TWO(x, y) {x, y, x, y}
 #elif SL_W == 8
 #define SL_EACH(x) {x, x, x, x, x, x, x, x}
 #else
@@ -229,6 +231,19 @@ static inline sl_v slv_sqrt(sl_v x) {
 #else
 #error "SL_W must be 1, 2, 4, 8 or 16"
 #endif /* SL_W */
+
+/* Of two lanes each: lane i of a, and lane j of b. */
+#ifdef __clang__
+#define SL_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+#define SL_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, (sl_b){__VA_ARGS__})
+#endif
+#if SL_W == 2
+#define slv_pair(a, i, b, j) SL_SHUFFLE(a, b, i, 2 + j)
+#elif SL_W == 4
+#define slv_pair(a, i, b, j) SL_SHUFFLE(a, b, i, 4 + j, 2 + i, 6 + j)
+#endif
+#define slv_pair_masks(a, i, b, j) ((sl_m)slv_pair((sl_v)(a), i, (sl_v)(b), j))
 
 /* Lanes 0 .. SL_W - 1 from and to consecutive doubles; no alignment is asked. */
 static inline sl_v slv_load(const double *from) {

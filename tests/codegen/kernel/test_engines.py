@@ -78,14 +78,17 @@ LANES = [
     (KernelOptions(width=8, groups=2, flags=("-O2",)), None),
     (KernelOptions(width=16, groups=1, flags=("-O1",)), VARIED),
     (KernelOptions(), None),
+    (KernelOptions(width=2, alone=True, paired=True, flags=("-O1",)), VARIED),
+    (KernelOptions(width=4, alone=True, paired=True, flags=("-O2",)), None),
 ]
 
 
-@pytest.mark.parametrize(
-    ("options", "tunable"),
-    LANES,
-    ids=[f"W{o.width}G{o.groups}P{o.packs}{''.join(o.flags or ())}{'-baked' * bool(t)}" for o, t in LANES],
-)
+def name_of(options: KernelOptions, tunable: tuple[str, ...] | None) -> str:
+    shape = f"W{options.width}G{options.groups}P{options.packs}{'-alone' * options.alone}"
+    return f"{shape}{''.join(options.flags or ())}{'-baked' * bool(tunable)}"
+
+
+@pytest.mark.parametrize(("options", "tunable"), LANES, ids=[name_of(*each) for each in LANES])
 def test_lanes_equal_casadi(
     options: KernelOptions,
     tunable: tuple[str, ...] | None,
@@ -236,6 +239,8 @@ def test_random_functions_equal_casadi(seed: int, shaken: Program, table: NDArra
     for width, level, tunable in ((4, "-O0", None), (2, "-O1", VARIED)):
         options = KernelOptions(width=width, groups=2, flags=(level,))
         assert_same(run(random, table[:9], options, tunable=tunable, settings=settings), expected)
+    options = KernelOptions(width=2 + seed % 2 * 2, alone=True, paired=True, flags=("-O0",))
+    assert_same(run(random, table[:9], options, settings=settings), expected)
 
 
 def test_an_operation_without_c_is_refused_by_name(shaken: Program) -> None:
@@ -266,7 +271,11 @@ def test_rare_cases_leave_the_fast_path_with_the_same_bits(case: str, shaken: Pr
     """Lanes that need a complete function stand beside lanes that do not."""
     table = np.stack([values_of(shaken), values_of(shaken, RARE[case]), values_of(shaken)])
     expected = run(shaken, table, KernelOptions(engine="casadi", flags=("-O2",)))
-    for options in (KernelOptions(width=4, groups=1, flags=("-O2",)), KernelOptions(width=1, groups=2, flags=("-O2",))):
+    for options in (
+        KernelOptions(width=4, groups=1, flags=("-O2",)),
+        KernelOptions(width=1, groups=2, flags=("-O2",)),
+        KernelOptions(width=4, alone=True, paired=True, flags=("-O2",)),
+    ):
         assert_same(run(shaken, table, options), expected)
 
 

@@ -78,6 +78,9 @@ def test_what_does_not_fit_is_refused(change: dict[str, Any], message: str) -> N
 @pytest.mark.parametrize(("options", "message"), [
     ({"engine": "numba"}, "engine is 'numba', expected one of lanes, casadi"),
     ({"width": 3}, "width is 3, expected a power of two"),
+    ({"alone": True, "width": 8}, "width is 8, expected 2 or 4 for a run alone"),
+    ({"alone": True, "groups": 2}, "groups is 2, expected 1 for a run alone"),
+    ({"paired": True}, "paired is True, expected alone to be, too"),
     ({"width": 0}, "width is 0, expected a whole number from 1"),
     ({"groups": 1.5}, r"groups is 1\.5, expected a whole number"),
     ({"packs": -1}, "packs is -1, expected a whole number from 1"),
