@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 
 from springline.codegen.files import FolderConflict
+from springline.runner.analysis import reaching_law
 from springline.runner.files import InputError
 from springline.runner.paper import GROUPS, reproduce, reproduction
 from springline.runner.paper.cases import CASES, JOINTS, MEASURES, cases
@@ -29,7 +30,7 @@ from springline.runner.paper.figures import FIGURES, OPEN_FIGURES
 from springline.runner.paper.measured import Measured
 from springline.runner.paper.report import change, number, plain
 from springline.runner.paper.reproduction import Reproduction
-from springline.runner.paper.runs import E8_SHAKE, measure, reaching_law, theory_of, with_velocities
+from springline.runner.paper.runs import E8_SHAKE, measure, with_velocities
 from springline.runner.run import simulate
 from springline.runner.scenario import load_scenario, packaged_scenarios
 
@@ -168,22 +169,6 @@ def test_disturbances_that_the_printed_errors_would_take() -> None:
         rest = np.zeros(2)
         _, _, sigma = scenario.system().function("slow_control")(rest, rest, rest, x, scenario.values())
         assert abs(reaching_law(scenario)(np.array([float(sigma[0])]))[0]) == pytest.approx(disturbance, rel=0.02)
-
-
-# Theory
-
-
-def test_the_theory_is_measured_along_the_run() -> None:
-    scenario = load_scenario("paper/group1_roll")
-    run = measure(scenario, simulate(scenario))
-    found = theory_of(scenario, run)
-    assert found.bounds.sliding == pytest.approx([0.342, 0.400], abs=5e-4)
-    assert found.margin.c1 == pytest.approx(3 - found.margin.bound)
-    assert 0 < found.margin.bound < 1
-    assert found.tail == pytest.approx(36.8, abs=0.1)
-    # The law asks for the disturbance at the edge of the residual set.
-    edge = np.abs(reaching_law(scenario)(np.array(found.residual)))
-    assert edge == pytest.approx(found.margin.per_joint, rel=1e-6)
 
 
 def test_velocity_errors_are_those_of_the_reference() -> None:

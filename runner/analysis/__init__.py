@@ -1,0 +1,5 @@
+"""What can be said of a design before it runs."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
