@@ -498,6 +498,11 @@ class System:
         parts = dict(zip(signals.parts, others, strict=True))
         return ControlSignals(command, wished, parts, error, sigma, a_law, dz, ahead)
 
+    @derived_property
+    def stated_control(self) -> ControlSignals:
+        """What the controller computes, as it states it: of the state as it is, with nothing put together anew."""
+        return self._signals_of_control()
+
     def _associated(
         self, values: Sequence[ca.SX], terms: Sequence[Term], late: ca.SX | None = None
     ) -> tuple[list[ca.SX], tuple[Term, ...]]:
