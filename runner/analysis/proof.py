@@ -18,6 +18,7 @@ from springline.model.control import LAWS
 from springline.model.symbolic import derivation
 from springline.model.system import System
 from springline.model.theory import Gap, Margin, SettlingBounds
+from springline.runner.analysis.loop import signal_values
 from springline.runner.analysis.reaching import limited, reaching_law
 from springline.runner.scenario import Scenario
 
@@ -70,11 +71,8 @@ def proof_reaches(scenario: Scenario) -> str:
 
 
 def signals_along(scenario: Scenario, t: Floats) -> Floats:
-    """w = [q1d, dq1d, ddq1d, b, db, ddb] along time, one column a time; those of its tables lie within the samples."""
-    rows = [table.rows(t) for table in scenario.tables()]
-    d = np.concatenate(rows) if rows else np.zeros((0, 1))
-    found: Floats = scenario.system().function("signals")(t[None, :], d, scenario.values()).full()
-    return found
+    """w = [q1d, dq1d, ddq1d, b, db, ddb] along time, one column a time."""
+    return signal_values(scenario, scenario.values()[None, :], t)[0].T
 
 
 def disturbance(scenario: Scenario, columns: Mapping[str, Floats]) -> tuple[Floats, Floats]:

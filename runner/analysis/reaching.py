@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import integrate
 
 from springline.model.control import LAWS
+from springline.runner.analysis.gain import equivalent_gain
 from springline.runner.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -18,7 +19,6 @@ Rate = Callable[[Floats], Floats]
 AMPLITUDES = (1e-4, 0.5)
 """Of sigma, SI: what every boundary states its range over."""
 
-_ANGLES = 256  # of a quarter of a period: the integrand is even about both of its ends
 _SPEEDS = 2000  # of sigma, where a reaching time is integrated
 
 
@@ -62,19 +62,6 @@ def limited(rate: Rate, limit: float) -> Rate:
     return lambda sigma: np.clip(rate(sigma), -limit, limit)
 
 
-def equivalent_gain(rate: Rate, amplitude: Floats) -> Floats:
-    """Describing function -2/(pi A) * integral of rate(A sin a) sin a over half a period, 1/s, at amplitudes A > 0.
-
-    It is the gain that a law has on a sine of sigma, and has a value where the slope at sigma = 0 has none. By the
-    midpoint rule in the sine's angle, which meets neither sigma = 0 nor the peak.
-    """
-    angle = (np.arange(_ANGLES) + 0.5) * (np.pi / 2 / _ANGLES)
-    sine = np.sin(angle)
-    sizes = np.atleast_1d(np.asarray(amplitude, dtype=np.float64))
-    asked = rate((sizes[:, None] * sine).ravel()).reshape(len(sizes), -1)
-    return np.asarray(-4 / np.pi / sizes * (asked @ sine) * (np.pi / 2 / _ANGLES), dtype=np.float64)
-
-
 def reaching_time(rate: Rate, start: float, to: float) -> float:
     """Time from |sigma| = start to |sigma| = to > 0 under the law alone, s: integral of d sigma / |rate|.
 
@@ -115,7 +102,7 @@ def law_curves(scenario: Scenario, start: Floats) -> dict[str, LawCurves]:
             sigma,
             np.abs(acting(sigma)),
             amplitude,
-            equivalent_gain(acting, amplitude),
+            np.array([-float(equivalent_gain(acting, size)) for size in amplitude]),
             np.abs(start),
             np.array(times),
         )

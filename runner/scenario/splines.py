@@ -81,14 +81,9 @@ class Spline:
 
         For a time outside of the samples, those of the nearest one.
         """
-        return self.rows(np.array([t]))[:, 0]
-
-    def rows(self, t: Floats) -> Floats:
-        """`row` at times (times,), one column a time."""
-        inside = np.clip(t, self.t0, self.end)
-        k = np.clip(np.floor((inside - self.t0) / self.dt).astype(np.int64), 0, len(self.coefficients) - 1)
-        flat = self.coefficients[k].reshape(len(t), -1).T
-        return np.concatenate([(inside - (self.t0 + k * self.dt))[None, :], flat])
+        inside = min(max(t, self.t0), self.end)
+        k = min(max(math.floor((inside - self.t0) / self.dt), 0), len(self.coefficients) - 1)
+        return np.concatenate([[inside - (self.t0 + k * self.dt)], self.coefficients[k].ravel()])
 
     def accelerations(self) -> Floats:
         """Accelerations at the samples, (samples, channels), SI units; between them they are linear."""
