@@ -111,7 +111,7 @@ class LinearLoop:
 
     def advance(self, period: float) -> tuple[Floats, Floats]:
         """Ex, Ez of the control's states a sample of `period` s later: z' = Ex x + Ez z."""
-        if not self.z.shape[-1] or _linearisation(self.scenario.structure()).euler:
+        if not self.z.shape[-1] or linearised(self.scenario).euler:
             return period * self.Dx, np.eye(self.z.shape[-1]) + period * self.Dz
         found = _control(self.scenario, self.values, self.times, self.x, self.z, self.amplitude, period)
         return found["ahead_x"], found["ahead_z"]
@@ -191,8 +191,9 @@ def _duration(scenario: Scenario) -> float:
     return scenario.step * scenario.steps
 
 
-def _linearisation(structure: Structure) -> Linearisation:
-    return linearisation_of(structure)
+def linearised(scenario: Scenario) -> Linearisation:
+    """The scenario's loop, linearised symbolically."""
+    return linearisation_of(scenario.structure())
 
 
 def _slots(scenario: Scenario, key: str) -> list[int]:
@@ -247,7 +248,7 @@ def _operating_points(
 ) -> tuple[Floats, Floats, dict[str, Floats]]:
     """x and u that keep the arm on its reference, and the plant's matrices there."""
     n, runs, count = scenario.system().n, len(values), len(times)
-    function = _linearisation(scenario.structure()).plant
+    function = linearised(scenario).plant
     w = signal_values(scenario, values, times)
     q, dq, ddq = (w[..., k * n : (k + 1) * n] for k in range(3))
     elastic = scenario.structure().drive == "elastic"
@@ -288,7 +289,7 @@ def _states_of_control(scenario: Scenario, values: Floats, times: Floats, x: Flo
 @lru_cache(maxsize=64)
 def _swept(structure: Structure) -> tuple[ca.Function, Floats, Floats]:
     """by_sigma at all nodes of a sine in each entry of s; these s for amplitude 1; the weights."""
-    linear = _linearisation(structure)
+    linear = linearisation_of(structure)
     sines, weights = quadrature()
     n = linear.system.n
     s = np.zeros((n, n * len(sines)))
@@ -306,7 +307,7 @@ def _control(
     amplitude they are zero.
     """
     system = scenario.system()
-    linear = _linearisation(scenario.structure())
+    linear = linearised(scenario)
     runs, count, n = len(values), len(times), system.n
     w = signal_values(scenario, values, times)
     points = runs * count
