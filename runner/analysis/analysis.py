@@ -16,6 +16,8 @@ from springline.runner.analysis import confirm as by_runs
 from springline.runner.analysis.continuous import delta_critical, growth
 from springline.runner.analysis.crossings import Margins, delay_max, margins
 from springline.runner.analysis.cycle import Cycle, limit_cycle
+from springline.runner.analysis.floquet import floquet_exponent
+from springline.runner.analysis.limits import limits_from
 from springline.runner.analysis.loop import Boundary, LinearLoop, linear_loop
 from springline.runner.analysis.modes import TimeScales, fast_gain, time_scales
 from springline.runner.analysis.proof import Proof, proof_of, proof_reaches
@@ -228,7 +230,8 @@ class _Work:
         if not self.gained:
             found = ["Boundaries hold about points of the reference taken one by one; that is no proof for the motion."]
         limits = limits_from(self.scenario)
-        found.append(f"Limits of law and motors: {limits.reason}.")
+        size = "" if limits.value is None else f" (|sigma| from {limits.value:.3g} on)"
+        found.append(f"Limits of law and motors are no part of it: {limits.reason}{size}.")
         return tuple(found)
 
 
