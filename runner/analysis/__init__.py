@@ -1,4 +1,4 @@
-"""One run: simulated, as tables with units, as figures."""
+"""Answers before the simulation: the loop linearised at frozen times, its boundaries, margins and time scales."""
 
 import lazy_loader
 
