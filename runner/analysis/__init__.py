@@ -1,4 +1,4 @@
-"""What can be said of a design before it runs."""
+"""Answers before the simulation: the loop linearised at frozen times, its boundaries, margins and time scales."""
 
 import lazy_loader
 

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _LAYERS = (1e-5, 10.0)
-_PER_DECADE = 8
+_PER_DECADE = 5
 
 
 def spectrum(loop: LinearLoop) -> Complex:
@@ -31,7 +31,7 @@ def growth(loop: LinearLoop) -> Floats:
 
 def delta_critical(
     scenario: Scenario,
-    amplitude: float = AMPLITUDE,
+    amplitude: ArrayLike = AMPLITUDE,
     *,
     times: ArrayLike | None = None,
     columns: Mapping[str, ArrayLike] | None = None,
@@ -53,7 +53,7 @@ def _runs(scenario: Scenario, columns: Mapping[str, ArrayLike] | None) -> int:
 
 
 def _least_layer(
-    scenario: Scenario, amplitude: float, times: ArrayLike | None, run: Floats, place: int
+    scenario: Scenario, amplitude: ArrayLike, times: ArrayLike | None, run: Floats, place: int
 ) -> Boundary:
     def loops(layers: Floats) -> LinearLoop:
         values = np.tile(run, (len(layers), 1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,14 +12,29 @@ from scipy.optimize import brentq
 
 from springline.runner.analysis.continuous import growth
 from springline.runner.analysis.loop import Boundary, LinearLoop
-from springline.runner.analysis.sampled import OpenLoop, continuous, cut, one_run, period_of, sampled_delay_max
+from springline.runner.analysis.sampled import (
+    LONGEST_HISTORY,
+    OpenLoop,
+    bisected,
+    continuous,
+    cut,
+    one_run,
+    period_of,
+    radii,
+    sampled,
+    worst_time,
+)
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+_PARTS = 8
+# Of a sample: delays that are tried between two whole ones.
 _EVENLY = 160
-_AROUND = np.sinh(np.linspace(-4.0, 4.0, 17))
-# Of a pole's distance from the axis: where the response is looked at beside its frequency.
+_AROUND = np.sinh(np.linspace(-4.0, 4.0, 16))
+# Of a pole's distance from the axis: where the response is looked at beside its frequency, never at it.
+_FARTHEST = 1e4
+# A factor beyond it, or its inverse, is none: the loop is where it was without that channel.
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +96,10 @@ def _roots(f: Callable[[float], float], grid: Floats, values: Floats) -> list[fl
 
 
 def _least_delay(response: _Response) -> tuple[float, float]:
-    """Smallest delay, s, alike in all channels, that brings a root to the axis, and its frequency; inf without."""
+    """Smallest delay, s, alike in all channels, that brings a root to the axis, and its frequency; inf without.
+
+    Of a sampled loop, whose delays are whole samples, it is one that there would be between two of them.
+    """
     grid = response.grid()
 
     def sizes(omega: Floats) -> Floats:
@@ -108,19 +127,38 @@ def delay_max(loop: LinearLoop) -> tuple[Boundary, ...]:
 
 def _delay_max(loop: LinearLoop) -> Boundary:
     period = period_of(loop)
-    if period is not None:
-        return sampled_delay_max(loop, period)
-    if growth(loop)[0] >= 0.0:
+    unstable = growth(loop)[0] >= 0.0 if period is None else radii(loop, period, 0.0).max() >= 1.0
+    if unstable:
         return Boundary(None, "the loop is unstable without any delay")
-    opened = continuous(loop)
+    opened = continuous(loop) if period is None else sampled(loop, period, 0.0)
     found = [
-        _least_delay(_Response(opened.F[0, k], opened.G[0, k], opened.C[0, k], None)) for k in range(len(loop.times))
+        _least_delay(_Response(opened.F[0, k], opened.G[0, k], opened.C[0, k], period)) for k in range(len(loop.times))
     ]
     delay, omega = min(found)
     if not np.isfinite(delay):
         return Boundary(None, "every delay is stable")
-    at = float(loop.times[found.index((delay, omega))])
-    return Boundary(delay, f"unstable above, at {omega:.4g} rad/s", at)
+    if period is None:
+        return Boundary(delay, f"unstable above, at {omega:.4g} rad/s", float(loop.times[found.index((delay, omega))]))
+    return _between_samples(loop, period, delay)
+
+
+def _between_samples(loop: LinearLoop, period: float, near: float) -> Boundary:
+    """The largest delay of a sampled loop that is stable with the whole samples in `near`, and not with one more."""
+    whole = math.floor(near / period)
+    if whole > LONGEST_HISTORY:
+        return Boundary(None, f"every delay up to {LONGEST_HISTORY} samples is stable")
+
+    def stable(delay: float) -> bool:
+        return bool(radii(loop, period, delay).max() < 1.0)
+
+    low = whole * period
+    for k in range(1, _PARTS + 1):
+        high = (whole + k / _PARTS) * period
+        if not stable(high):
+            value = bisected(stable, low, high)
+            return Boundary(value, "unstable above", worst_time(loop, radii(loop, period, value)))
+        low = high
+    return Boundary(low, "unstable above")
 
 
 def margins(loop: LinearLoop) -> tuple[Margins, ...]:
@@ -154,7 +192,7 @@ def _channel(opened: OpenLoop, times: Floats, joint: int) -> tuple[float, ...]:
                 down = max(down, (factor, omega, float(time)))
         for angle, omega in phases:
             phase = min(phase, (angle, omega, float(time)))
-    nearest = up if up[0] * down[0] < 1.0 or down[0] == 0.0 else down
+    nearest = up if down[0] == 0.0 or up[0] < 1 / down[0] else down
     at = phase[2] if np.isfinite(phase[0]) else nearest[2]
     return up[0], down[0], nearest[0], nearest[1], phase[0], phase[1], at
 
@@ -170,18 +208,13 @@ def _boundaries(response: _Response) -> tuple[list[tuple[float, float]], list[tu
     gains = []
     for omega in _roots(lambda w: at(w).imag, grid, values.imag):
         here = at(omega).real
-        if here > 0.0:
-            gains.append((1 / here, omega))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = [0.0] if response.period is None else [0.0, np.pi / response.period]
-        for omega in ends:
-            try:
-                here = at(omega).real
-            except np.linalg.LinAlgError:  # an integrator: the response has no bound there, and no gain a boundary
-                continue
-            if np.isfinite(here) and here > 0.0:
-                gains.append((1 / here, omega))
+        gains.append((here, omega))
+    for omega in [0.0] if response.period is None else [0.0, np.pi / response.period]:
+        try:
+            gains.append((at(omega).real, omega))
+        except np.linalg.LinAlgError:  # an integrator: the response has no bound there, and no gain a boundary
+            continue
     phases = [
         (abs(float(np.angle(at(omega)))), omega) for omega in _roots(lambda w: abs(at(w)) - 1.0, grid, np.abs(values) - 1.0)
     ]
-    return gains, phases
+    return [(1 / here, omega) for here, omega in gains if 1 / _FARTHEST < here < _FARTHEST], phases

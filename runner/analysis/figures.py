@@ -37,7 +37,7 @@ def spectrum_by_delta(found: Analysis) -> Figure | None:
     layers = np.geomspace(low, high, _LAYERS)
     figure, grid = panels(width=COLUMN, height=2.0)
     axes = grid[0, 0]
-    amplitudes = sorted({AMPLITUDES[0], found.loop.amplitude, AMPLITUDES[1]})
+    amplitudes = sorted({AMPLITUDES[0], found.scenario.sigma_amplitude, AMPLITUDES[1]})
     for line, amplitude in zip(LINES, amplitudes, strict=False):
         rates = growth(linear_loop(found.scenario, amplitude, columns={key: layers}))
         axes.plot(layers, rates, label=f"σ amplitude {amplitude:g}", **line)
@@ -135,7 +135,7 @@ def laws(found: Analysis, curves: Mapping[str, LawCurves]) -> Figure | None:
     grid[0, 1].set_xlabel("amplitude of σ")
     grid[0, 1].set_ylabel(label("equivalent gain", "1/s"))
     grid[0, 1].axvspan(*AMPLITUDES, color="0.9", linewidth=0)
-    grid[0, 1].axvline(found.loop.amplitude, **_GIVEN)
+    grid[0, 1].axvline(found.scenario.sigma_amplitude, **_GIVEN)
     for axes in grid[0]:
         axes.minorticks_off()
     legend_above(figure, columns=3)

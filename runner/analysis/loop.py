@@ -21,6 +21,8 @@ AMPLITUDE = 0.1
 """Of sigma, where nothing else is said."""
 
 _TIMES = 17
+_STILL = 1e3
+# 1/s: the rate at which the force of a lag that other runs have goes to zero; nothing drives it, and it drives nothing.
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,7 @@ class Boundary:
 class LinearLoop:
     """Plant and control at some times for some runs; all arrays are (runs, times, ...), SI units.
 
-    amplitude  of sigma, for which the gains hold
+    amplitude  of sigma, (n,), for which the gains hold
     times      s;  values: parameter vectors, (runs, slots)
     x, u, z    operating points: on the reference, with the motors and the forces that carry it
     A, B       of the plant: dx = A x + B u
@@ -54,7 +56,7 @@ class LinearLoop:
     """
 
     scenario: Scenario
-    amplitude: float
+    amplitude: Floats
     times: Floats
     values: Floats
     x: Floats
@@ -80,29 +82,24 @@ class LinearLoop:
         """Whether there are springs between motors and joints."""
         return bool(self.A.shape[-1] == 4 * self.n)
 
-    @property
-    def lagging(self) -> bool:
-        """Whether a motor's force follows its command later."""
-        return bool((self.lag > 0.0).any())
-
     def driven(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Plant with the lags of its motors as states behind its own: A, B, and Cx for its states; and Dx.
-
-        A motor without a lag takes the command as it is; its state stands still at zero.
-        """
-        if not self.lagging:
+        """Plant with the lags of its motors as states behind its own: A, B, and Cx for its states; and Dx."""
+        late = np.flatnonzero((self.lag > 0.0).any(axis=0))
+        if not late.size:
             return self.A, self.B, self.Cx, self.Dx
-        n, nx = self.n, self.A.shape[-1]
-        late = self.lag > 0.0
-        rate = np.where(late, 1 / np.where(late, self.lag, 1.0), 0.0)[:, None, :]
-        a = np.zeros((*self.A.shape[:2], nx + n, nx + n))
-        b = np.zeros((*self.A.shape[:2], nx + n, n))
+        nx, more = self.A.shape[-1], late.size
+        slow = self.lag[:, late] > 0.0
+        rate = np.where(slow, 1 / np.where(slow, self.lag[:, late], 1.0), 0.0)
+        states, motors = range(nx, nx + more), late.tolist()
+        a = np.zeros((*self.A.shape[:2], nx + more, nx + more))
+        b = np.zeros((*self.A.shape[:2], nx + more, self.n))
         a[..., :nx, :nx] = self.A
-        a[..., :nx, nx:] = self.B * late[:, None, None, :]
-        a[..., range(nx, nx + n), range(nx, nx + n)] = np.where(late[:, None, :], -rate, -_STILL)
-        b[..., :nx, :] = self.B * ~late[:, None, None, :]
-        b[..., range(nx, nx + n), range(n)] = rate
-        return a, b, _padded(self.Cx, n), _padded(self.Dx, n)
+        a[..., :nx, nx:] = self.B[..., late] * slow[:, None, None, :]
+        a[..., states, states] = -np.where(slow, rate, _STILL)[:, None, :]
+        b[..., :nx, :] = self.B
+        b[..., :nx, late] *= ~slow[:, None, None, :]
+        b[..., states, motors] = rate[:, None, :]
+        return a, b, _padded(self.Cx, more), _padded(self.Dx, more)
 
     def closed(self) -> Floats:
         """The continuous closed loop, (runs, times, m, m): states x, those of lags, z."""
@@ -115,10 +112,6 @@ class LinearLoop:
             return period * self.Dx, np.eye(self.z.shape[-1]) + period * self.Dz
         found = _control(self.scenario, self.values, self.times, self.x, self.z, self.amplitude, period)
         return found["ahead_x"], found["ahead_z"]
-
-
-_STILL = 1.0
-# 1/s: the rate at which what nothing drives and nothing reads would go to zero.
 
 
 def _padded(rows: Floats, n: int) -> Floats:
@@ -135,7 +128,7 @@ def joined(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
 
 def linear_loop(
     scenario: Scenario,
-    amplitude: float = AMPLITUDE,
+    amplitude: ArrayLike = AMPLITUDE,
     *,
     times: ArrayLike | None = None,
     columns: Mapping[str, ArrayLike] | None = None,
@@ -143,7 +136,7 @@ def linear_loop(
 ) -> LinearLoop:
     """The loop of a scenario linearised along its reference.
 
-    amplitude  of sigma, for which the law's gain is taken, its SI unit
+    amplitude  of sigma, for which the law's gain is taken, one number or one a joint, SI units
     times      along the reference, s; 17 over the run where they are not given
     columns    numbers that are other for each run, by numeric key; one run without
     values     parameter vectors (runs, slots) in place of columns
@@ -155,14 +148,15 @@ def linear_loop(
     at = np.atleast_1d(np.asarray(np.linspace(0.0, _duration(scenario), _TIMES) if times is None else times, float))
     x, u, plant = _operating_points(scenario, values, at)
     z = _states_of_control(scenario, values, at, x, u)
-    control = _control(scenario, values, at, x, z, amplitude, 0.0)
+    sizes = np.broadcast_to(np.asarray(amplitude, float), u.shape[-1:])
+    control = _control(scenario, values, at, x, z, sizes, 0.0)
     free = unlimited(scenario, values)
-    lags = _slots(scenario, "actuator.lag")
+    lags = slots_of(scenario, "actuator.lag")
     n = u.shape[-1]
     lag = values[:, lags] if lags else np.zeros((len(values), n))
     reach = control["u_s"]
     return LinearLoop(
-        scenario, amplitude, at, free, x, u, z, plant["A"], plant["B"],
+        scenario, sizes, at, free, x, u, z, plant["A"], plant["B"],
         control["u_x"], control["u_z"], control["dz_x"], control["dz_z"],
         reach, _law_gain(scenario, free, x, reach), lag,
     )  # fmt: skip
@@ -196,7 +190,7 @@ def linearised(scenario: Scenario) -> Linearisation:
     return linearisation_of(scenario.structure())
 
 
-def _slots(scenario: Scenario, key: str) -> list[int]:
+def slots_of(scenario: Scenario, key: str) -> list[int]:
     """Places in p of a parameter with one entry per joint."""
     return [k for k, slot in enumerate(scenario.system().slots) if slot.key.rpartition(".")[0] == key]
 
@@ -204,7 +198,7 @@ def _slots(scenario: Scenario, key: str) -> list[int]:
 def unlimited(scenario: Scenario, values: Floats) -> Floats:
     """Parameter vectors without the limits of the motors."""
     free = values.copy()
-    free[:, _slots(scenario, "control.U_max")] = np.inf
+    free[:, slots_of(scenario, "control.U_max")] = np.inf
     return free
 
 
@@ -299,7 +293,7 @@ def _swept(structure: Structure) -> tuple[ca.Function, Floats, Floats]:
 
 
 def _control(
-    scenario: Scenario, values: Floats, times: Floats, x: Floats, z: Floats, amplitude: float | None, period: float
+    scenario: Scenario, values: Floats, times: Floats, x: Floats, z: Floats, amplitude: Floats | None, period: float
 ) -> dict[str, Floats]:
     """What the control is at operating points, by name, each (runs, times, rows, columns).
 
@@ -325,7 +319,7 @@ def _control(
     if amplitude is None or not linear.cut:
         return found
     function, sines, weights = _swept(scenario.structure())
-    s = np.tile((amplitude * sines).T.ravel()[:, None], points)
+    s = np.tile((amplitude[:, None] * sines).T.ravel()[:, None], points)
     for name, values_at in zip(("u", "dz", "ahead"), apart(over_runs(function, *before, s, *after)), strict=True):
         shape = (*values_at.shape[:3], n, len(weights))
         found[f"{name}_s"] = gain = values_at.reshape(shape) @ weights / amplitude

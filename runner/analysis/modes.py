@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from springline.runner.analysis.loop import AMPLITUDE, Boundary, LinearLoop, joined, linear_loop
+from springline.runner.analysis.loop import AMPLITUDE, Boundary, LinearLoop, joined, linear_loop, linearised
 from springline.runner.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -143,7 +143,7 @@ def _composite(loop: LinearLoop) -> Complex:
 
 def fast_gain(
     scenario: Scenario,
-    amplitude: float = AMPLITUDE,
+    amplitude: ArrayLike = AMPLITUDE,
     wanted: float = DAMPING,
     *,
     times: ArrayLike | None = None,
@@ -159,7 +159,7 @@ def fast_gain(
     system = scenario.system()
     keys = [slot.key for slot in system.slots]
     places = [keys.index(f"control.K_f.{i}") for i in range(system.n)] if "control.K_f.0" in keys else []
-    if not places or not _reads_rates(scenario, amplitude, times):
+    if not places or not linearised(scenario).reads("control.K_f"):
         reason = "a rigid drive has no fast modes" if not places else "the controller has no fast control K_f"
         return (Boundary(None, reason),) * system.n
     run = scenario.values_for(columns)[0] if columns else scenario.values()
@@ -194,12 +194,6 @@ def fast_gain(
         Boundary(float(gain) if met else None, reason if met else f"no gain K_f reaches {reason}")
         for gain, met in zip(gains, reached, strict=True)
     )
-
-
-def _reads_rates(scenario: Scenario, amplitude: float, times: ArrayLike | None) -> bool:
-    from springline.runner.analysis.loop import linearised
-
-    return linearised(scenario).reads("control.K_f")
 
 
 def _owners(loop: LinearLoop) -> NDArray[np.intp]:

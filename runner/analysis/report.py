@@ -95,10 +95,10 @@ def _boundary(found: Analysis) -> Callable[[dict[str, Floats]], Floats] | None:
     """The smallest stable delta of columns of numbers, where there is one; at the point that decides it."""
     if found.row("delta_critical").value is None:
         return None
-    at = delta_critical(found.scenario, found.loop.amplitude)[0].at
+    at = delta_critical(found.scenario, found.scenario.sigma_amplitude)[0].at
 
     def boundary(columns: dict[str, Floats]) -> Floats:
-        items = delta_critical(found.scenario, found.loop.amplitude, times=[at], columns=columns)
+        items = delta_critical(found.scenario, found.scenario.sigma_amplitude, times=[at], columns=columns)
         return np.array([math.nan if item.value is None else item.value for item in items])
 
     return boundary
@@ -115,7 +115,7 @@ def _chatter(scenario: Scenario, found: Analysis, names: Sequence[str]) -> list[
     result = []
     for name in names:
         for words, changes in ways:
-            cycle = limit_cycle(scenario.with_overrides({"control.law": name, **changes}), found.loop.amplitude)
+            cycle = limit_cycle(scenario.with_overrides({"control.law": name, **changes}), found.scenario.sigma_amplitude)
             size, frequency = (cycle.amplitude, cycle.frequency) if cycle else (math.nan, math.nan)
             result.append(Chatter(name, words, size, frequency))
     return result
