@@ -200,8 +200,8 @@ class _Work:
         if least <= _UNBOUNDED * here:
             return ""
         return (
-            f"the law's gain grows without bound as sigma goes to zero ({least / here:.3g} times as much at an amplitude "
-            f"of {AMPLITUDES[0]:g} as at {self.amplitude:g})"
+            f"the law's gain grows without bound as sigma goes to zero ({least / here:.3g} times as much at an "
+            f"amplitude of {AMPLITUDES[0]:g} as at {self.amplitude:g})"
         )
 
     @cached_property
@@ -224,8 +224,8 @@ class _Work:
     def notes(self) -> tuple[str, ...]:
         """What holds for all verdicts."""
         found = [
-            f"Boundaries hold for oscillations of sigma of {self.amplitude:g} ([analysis] sigma_amplitude), about points "
-            "of the reference taken one by one; that is no proof for the motion between them."
+            f"Boundaries hold for oscillations of sigma of {self.amplitude:g} ([analysis] sigma_amplitude), about "
+            "points of the reference taken one by one; that is no proof for the motion between them."
         ]
         if not self.gained:
             found = ["Boundaries hold about points of the reference taken one by one; that is no proof for the motion."]
@@ -259,7 +259,9 @@ def _number(value: float, unit: str) -> str:
     return f"{value:.3g} {unit}" if unit not in ("", "1") else f"{value:.3g}"
 
 
-def _over_ranges(work: _Work, found: Sequence[Boundary], unit: str, *, worst: Callable[[Sequence[float]], float]) -> str:
+def _over_ranges(
+    work: _Work, found: Sequence[Boundary], unit: str, *, worst: Callable[[Sequence[float]], float]
+) -> str:
     """What becomes of a boundary over --range, as a sentence; "" without ranges."""
     if not work.columns:
         return ""
@@ -296,7 +298,9 @@ def _delta(work: _Work) -> list[Row]:
     ok = given > most
     holds = _at(work, boundary, others, unit)
     if given <= boundary.value:
-        verdict = f"unstable: delta = {given:g} is below the smallest stable one, {boundary.value:.3g} ({holds}); raise it"
+        verdict = (
+            f"unstable: delta = {given:g} is below the smallest stable one, {boundary.value:.3g} ({holds}); raise it"
+        )
     elif not ok:
         verdict = f"delta = {given:g} is stable above {boundary.value:.3g} ({holds}), but not over the ranges; raise it"
     else:
@@ -390,8 +394,14 @@ def _epsilon(work: _Work) -> list[Row]:
     return [Row("epsilon_ratio", float(ratios[k]), "1", ok, text)]
 
 
+def mode_text(value: complex) -> str:
+    """An eigenvalue and its conjugate for people; a real part that is rounding is 0."""
+    real = value.real if abs(value.real) > 1e-9 * abs(value) else 0.0
+    return f"{real:.3g} ± {abs(value.imag):.4g}i"
+
+
 def _modes(values: Sequence[complex]) -> str:
-    return " and ".join(f"{value.real:.3g} ± {value.imag:.4g}i" for value in values)
+    return " and ".join(map(mode_text, values))
 
 
 def _fast_damping(work: _Work) -> list[Row]:
@@ -423,9 +433,7 @@ def _k1(work: _Work) -> list[Row]:
     unit = " or ".join(dict.fromkeys(f"{joint.unit}/s^2" for joint in work.joints))
     if proof is None:
         rows = [Row("k1_margin", None, unit, None, reason)]
-        return rows + [
-            Row(f"k1_margin_{joint.name}", None, f"{joint.unit}/s^2", None, reason) for joint in work.joints
-        ]
+        return rows + [Row(f"k1_margin_{joint.name}", None, f"{joint.unit}/s^2", None, reason) for joint in work.joints]
     k1 = float(work.scenario.value_of("control.k1"))  # type: ignore[arg-type] # a number
     largest = proof.disturbed.per_joint
     margins = k1 - largest
@@ -447,7 +455,9 @@ def _k1(work: _Work) -> list[Row]:
         size = f"sigma stays within {proof.residual[i]:.3g} {joint.unit}/s (in the run: {proof.remaining[i]:.3g})"
         if not math.isfinite(proof.residual[i]):
             size = "no size of sigma is safe: the law never exceeds the disturbance"
-        text = f"largest |d sigma/dt - law| {largest[i]:.3g} {joint.unit}/s^2 after the first quarter of the run; {size}"
+        text = (
+            f"largest |d sigma/dt - law| {largest[i]:.3g} {joint.unit}/s^2 after the first quarter of the run; {size}"
+        )
         ok = bool(margins[i] > 0)
         rows.append(Row(f"k1_margin_{joint.name}", float(margins[i]), f"{joint.unit}/s^2", ok, text))
     return rows
@@ -465,7 +475,7 @@ def _margins(work: _Work) -> list[Row]:
     gains, phases = np.array(found.gain, dtype=float), np.array(found.phase, dtype=float)
     rows = []
     distance = np.where(np.isfinite(gains) & (gains > 0), np.abs(np.log(np.where(gains > 0, gains, 1.0))), np.inf)
-    for name, unit, values, sizes in (("gain_margin", "1", gains, distance), ("phase_margin", "rad", phases, phases)):
+    for name, values, sizes in (("gain_margin", gains, distance), ("phase_margin", phases, phases)):
         known = np.where(np.isnan(sizes), np.inf, sizes)
         k = int(np.argmin(known))
         words = _gain_words if name == "gain_margin" else _phase_words
@@ -528,7 +538,9 @@ def _floquet(work: _Work) -> list[Row]:
     if found.value is None:
         return [Row("floquet_exponent", None, "1/s", None, found.reason)]
     stable = found.value < 0
-    verdict = "disturbances of the periodic motion die out" if stable else "unstable: they grow along the periodic motion"
+    verdict = (
+        "disturbances of the periodic motion die out" if stable else "unstable: they grow along the periodic motion"
+    )
     text = f"{verdict}, {found.value:.3g} 1/s; {found.reason}"
     return [Row("floquet_exponent", found.value, "1/s", stable, text)]
 

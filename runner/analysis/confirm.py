@@ -39,7 +39,7 @@ _NOTHING = 1e-9  # of the amplitude: rounding
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What a run came to: the joints' rates, rows x n, their sigma likewise, its times, and whether it went to the end."""
+    """What a run came to: times, rates and sigma of the joints (a row each), and whether it went to the end."""
 
     t: Floats
     rates: Floats
@@ -71,7 +71,8 @@ def _sizes(t: Floats, values: Floats, share: tuple[float, float]) -> Floats:
     """Root mean square over a share of the run, less the mean, per column."""
     span = t[-1] - t[0]
     rows = (t >= t[0] + share[0] * span) & (t <= t[0] + share[1] * span)
-    return np.std(values[rows], axis=0)
+    sizes: Floats = np.std(values[rows], axis=0)
+    return sizes
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,9 @@ class Bench:
             changes["mechanism.limits"] = [[-float("inf"), float("inf")]] * len(joints)
         silent = given.with_overrides(changes)
         for table, quiet in (("sensor", 0.0), ("actuator", float("inf"))):
-            names = ("position_noise", "velocity_noise", "position_resolution") if table == "sensor" else ("rate_limit",)
+            names = (
+                ("position_noise", "velocity_noise", "position_resolution") if table == "sensor" else ("rate_limit",)
+            )
             silent = silent.with_overrides({f"{table}.{name}": [quiet] * len(joints) for name in names})
         return silent.with_overrides(self._start(silent))
 
@@ -144,7 +147,11 @@ class Bench:
         system = self.held.system()
         every = max(1, int(2 * np.pi / self.fastest / 12 / step))
         settings = LoopSettings(
-            steps=round(self.duration / step), step=step, bound=self.scenario.bound, hold=max(hold, 1), output_every=every
+            steps=round(self.duration / step),
+            step=step,
+            bound=self.scenario.bound,
+            hold=max(hold, 1),
+            output_every=every,
         )
         found = loop.run(values, settings)
         assert found.trajectory is not None and found.rows is not None
@@ -284,7 +291,7 @@ def confirmed_delay(bench: Bench, expected: float) -> tuple[float | None, str]:
 
 
 def confirmed_cycle(bench: Bench) -> tuple[Floats, float, str]:
-    """Amplitude of sigma per joint and frequency (rad/s) of the oscillation that a run ends in, and how it was found."""
+    """Amplitude of sigma per joint, and frequency (rad/s), of what a run ends in, and how they were found."""
     scenario, held = bench.scenario, bench.held
     step = scenario.step if scenario.control_every else bench.step
     structure = replace(held.structure(), delay=scenario.structure().delay)

@@ -1,4 +1,4 @@
-"""Limit cycles: where the law's equivalent gain, which depends on the amplitude of sigma, makes the loop turn stable."""
+"""Limit cycles: where the law's equivalent gain, which depends on sigma's amplitude, makes the loop turn stable."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class Cycle:
 
 
 def critical(loop: LinearLoop) -> tuple[float, float, int, int]:
-    """How fast the least stable mode of the loop as it runs grows (1/s), its frequency (rad/s), joint, and time's index.
+    """How fast the least stable mode of the loop grows (1/s), its frequency (rad/s), joint, and index of the time.
 
-    Of the first run. Continuous or sampled with the scenario's period and delay.
+    Of the first run, as it runs: continuous or sampled with the scenario's period and delay.
     """
     opened = cut(loop)
     values, vectors = np.linalg.eig(opened.closed[0])

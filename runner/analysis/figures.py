@@ -46,7 +46,7 @@ def spectrum_by_delta(found: Analysis) -> Figure | None:
     if given:
         axes.axvline(given, label="δ of the scenario", **_GIVEN)
     axes.set_xscale("log")
-    axes.set_xlabel(label("δ", row.unit))
+    axes.set_xlabel(f"δ [{row.unit}]")
     axes.set_ylabel(label("largest real part", "1/s"))
     _ticks(axes, layers)
     legend_above(figure)
@@ -100,17 +100,18 @@ def channels(found: Analysis) -> Figure:
         matrix = point[:, None, None] * np.eye(len(f)) - inner
         response = -(c[[joint]] @ np.linalg.solve(matrix, np.broadcast_to(g[:, [joint]], (len(omega), len(f), 1))))
         response = response[:, 0, 0]
-        phase = np.degrees(np.unwrap(np.angle(response)))
-        phase -= 360.0 * np.round((phase[0] + 180.0) / 360.0)
+        phase = np.degrees(np.angle(response)) % 360.0 - 360.0
+        phase[1:][np.abs(np.diff(phase)) > 180.0] = np.nan  # no line across the page where it comes round
         grid[0, 0].plot(omega, np.abs(response), label=joints[joint].name, **line)
         grid[1, 0].plot(omega, phase, **line)
     grid[0, 0].axhline(1.0, color="black", linewidth=0.6)
     grid[0, 0].set_yscale("log")
     grid[0, 0].set_ylabel("|L|")
-    for turn in range(-3, 3):
-        grid[1, 0].axhline(180.0 + 360.0 * turn, color="black", linewidth=0.6)
-    low, high = grid[1, 0].dataLim.intervaly
-    grid[1, 0].set_ylim(min(low, -190.0) - 10, max(high, -90.0) + 10)
+    grid[1, 0].axhline(-180.0, color="black", linewidth=0.6)
+    grid[1, 0].set_ylim(-360.0, 0.0)
+    grid[1, 0].set_yticks([-360, -270, -180, -90, 0])
+    for axes in grid[:, 0]:
+        axes.minorticks_off()
     grid[1, 0].set_ylabel("phase of L [degrees]")
     grid[1, 0].set_xlabel(label("frequency", "rad/s"))
     grid[1, 0].set_xscale("log")
@@ -192,7 +193,7 @@ def figures(
         (
             "channels",
             "**Margins.** The loop cut at one motor's channel, the others closed. Where |L| is 1, the distance of the "
-            "phase from the lines at ±180 degrees is the phase margin; where the phase crosses one, 1/|L| is the gain "
+            "phase from the line at −180 degrees is the phase margin; where the phase crosses it, 1/|L| is the gain "
             "margin.",
             channels(found),
         ),

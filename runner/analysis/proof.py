@@ -72,7 +72,8 @@ def proof_reaches(scenario: Scenario) -> str:
 
 def signals_along(scenario: Scenario, t: Floats) -> Floats:
     """w = [q1d, dq1d, ddq1d, b, db, ddb] along time, one column a time."""
-    return signal_values(scenario, scenario.values()[None, :], t)[0].T
+    found: Floats = signal_values(scenario, scenario.values()[None, :], t)[0].T
+    return found
 
 
 def disturbance(scenario: Scenario, columns: Mapping[str, Floats]) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.codegen.files import canonical_json, write_tree
-from springline.runner.analysis.analysis import Analysis
+from springline.runner.analysis.analysis import Analysis, mode_text
 from springline.runner.analysis.continuous import delta_critical
 from springline.runner.analysis.cycle import limit_cycle
 from springline.runner.analysis.figures import figures
@@ -43,7 +43,7 @@ _WORDS = {True: "[[holds]]", False: "[[fails]]", None: "–"}
 
 @dataclass(frozen=True, slots=True)
 class Chatter:
-    """The limit cycle that a law is predicted to have: how its control runs, amplitude of sigma and frequency, rad/s."""
+    """The limit cycle that is predicted of a law: how its control runs, amplitude of sigma, and frequency, rad/s."""
 
     law: str
     control: str
@@ -96,9 +96,10 @@ def _boundary(found: Analysis) -> Callable[[dict[str, Floats]], Floats] | None:
     if found.row("delta_critical").value is None:
         return None
     at = delta_critical(found.scenario, found.scenario.sigma_amplitude)[0].at
+    times = None if at is None else [at]
 
     def boundary(columns: dict[str, Floats]) -> Floats:
-        items = delta_critical(found.scenario, found.scenario.sigma_amplitude, times=[at], columns=columns)
+        items = delta_critical(found.scenario, found.scenario.sigma_amplitude, times=times, columns=columns)
         return np.array([math.nan if item.value is None else item.value for item in items])
 
     return boundary
@@ -115,7 +116,9 @@ def _chatter(scenario: Scenario, found: Analysis, names: Sequence[str]) -> list[
     result = []
     for name in names:
         for words, changes in ways:
-            cycle = limit_cycle(scenario.with_overrides({"control.law": name, **changes}), found.scenario.sigma_amplitude)
+            cycle = limit_cycle(
+                scenario.with_overrides({"control.law": name, **changes}), found.scenario.sigma_amplitude
+            )
             size, frequency = (cycle.amplitude, cycle.frequency) if cycle else (math.nan, math.nan)
             result.append(Chatter(name, words, size, frequency))
     return result
@@ -137,37 +140,33 @@ def _document(
     scenario, joints = found.scenario, found.scenario.system().joints
     confirmed = any(row.confirmed is not None for row in found.rows)
     columns = ["", "", "value", *(["runs"] if confirmed else []), "unit", ""]
-    rows = []
+    verdicts = []
     for row in found.rows:
         runs = [_shown(row.confirmed)] if confirmed else []
-        rows.append([f"`{row.name}`", _WORDS[row.ok], _shown(row.value), *runs, row.unit, row.text])
+        verdicts.append([f"`{row.name}`", _WORDS[row.ok], _shown(row.value), *runs, row.unit, row.text])
     blocks: list[Block] = [
         Heading("Verdicts"),
-        Table(columns, rows, labels=len(columns)),
+        Table(columns, verdicts, labels=len(columns)),
         Bullets([*found.notes, *scenario.warnings]),
     ]
     if found.loop.elastic:
         scales = time_scales(found.loop)
-        table = [
-            (
-                f"{t:.3g}",
-                _shown(scales.slow_bandwidth[0, k]),
-                *(_mode(mode) for item in (scales.fast_free, scales.fast_alone, scales.fast_composite)
-                  for mode in item[0, k]),
-            )
-            for k, t in enumerate(found.loop.times)
-            if k % 4 == 0
-        ]  # fmt: skip
+        modes = np.concatenate([scales.fast_free[0], scales.fast_alone[0], scales.fast_composite[0]], axis=-1)
+        points = [
+            (f"{t:.3g}", _shown(slow), *(mode_text(mode).replace("-", "−") for mode in row))
+            for t, slow, row in list(zip(found.loop.times, scales.slow_bandwidth[0], modes, strict=True))[::4]
+        ]
         names = [f"{what}, {k + 1}" for what in ("free", "fast control", "closed loop") for k in range(len(joints))]
+        text = """Slow bandwidth and the springs' modes [1/s] at points of the reference: without fast control, with it,
+            and in the closed loop."""
         blocks += [
             Heading("Time scales"),
-            Text("Slow bandwidth and the springs' modes [1/s] at points of the reference: without fast control, with it, "
-                 "and in the closed loop."),
-            Table(["t [s]", "slow", *names], table),
-        ]  # fmt: skip
+            Text(" ".join(text.split())),
+            Table(["t [s]", "slow", *names], points),
+        ]
     if found.proof is not None:
         proof = found.proof
-        table = [
+        measured = [
             (
                 joint.name,
                 *map(_shown, (proof.disturbed.per_joint[i], proof.ringing[i], proof.margin.per_joint[i])),
@@ -182,12 +181,12 @@ def _document(
         )
         blocks += [
             Heading("The proof"),
-            Table([*heads, "t_smax [s]", "t_a [s]"], table, caption),
+            Table([*heads, "t_smax [s]", "t_a [s]"], measured, caption),
             Text("Where the proof does not reach this run:"),
             Bullets([f"{gap.value}." for gap in proof.gaps]),
         ]
     if curves:
-        rows = [
+        compared = [
             (
                 curve.title,
                 *(_shown(value) for value in curve.reaching_time),
@@ -198,11 +197,10 @@ def _document(
         ways = list(dict.fromkeys(item.control for item in chatter))
         heads = [f"{joint.name}: σ(0) to 1 % [s]" for joint in joints]
         heads += [f"{what}, {way}" for way in ways for what in ("σ of its limit cycle", "[rad/s]")]
-        blocks += [Heading("Reaching laws"), Table(["law", *heads], rows, "–: no limit cycle above 10⁻⁶ is predicted.")]
+        blocks += [
+            Heading("Reaching laws"),
+            Table(["law", *heads], compared, "–: no limit cycle above 10⁻⁶ is predicted."),
+        ]
     blocks += [Heading("Figures"), *pictures]
     subtitle = f"{scenario.source}, analysed by springline {__version__} from its linearised equations and its proof."
     return Document("What the design can do", subtitle, blocks)
-
-
-def _mode(value: complex) -> str:
-    return f"{value.real:.3g} ± {value.imag:.4g}i".replace("-", "−")

@@ -77,9 +77,7 @@ def varied_keys(scenario: Scenario) -> dict[str, float]:
     return found
 
 
-def sensitivities(
-    scenario: Scenario, boundary: Callable[[dict[str, Floats]], Floats] | None
-) -> Sensitivities:
+def sensitivities(scenario: Scenario, boundary: Callable[[dict[str, Floats]], Floats] | None) -> Sensitivities:
     """Run the scenario with each parameter ten percent smaller and larger.
 
     boundary  the smallest stable delta by columns of numeric keys, NaN where there is none; None without a delta
@@ -110,7 +108,5 @@ def sensitivities(
     matters = [k for k in range(len(names)) if any(effect.reach[k] > 1e-9 for effect in known)]
     return Sensitivities(
         tuple(names[k] for k in matters),
-        tuple(
-            Effect(item.title, item.unit, item.nominal, item.low[matters], item.high[matters]) for item in known
-        ),
+        tuple(Effect(item.title, item.unit, item.nominal, item.low[matters], item.high[matters]) for item in known),
     )

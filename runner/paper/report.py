@@ -237,10 +237,10 @@ def _theory(study: Study) -> list[Block]:
                 run.metric("settling_time", joint),
             )
             rows.append((f"{case.group}", case.name, joint, *map(number, values)))
-    columns = ["group", "case", "joint", "largest |H⁻¹S|", "S̄0", "k1 − S̄0", "largest |d|", "residual |σ|", "largest |σ|"]
-    columns += ["t_smax [s]", "t_q [s]", "t_a [s]", "settling time [s]"]
-    caption = """d = σ̇ − law(σ) is the disturbance that the law meets, springs and a payload that the controller does not
-        know included; its largest size is that after the first quarter of the run, that of σ is of the second half.
+    columns = ["group", "case", "joint", "largest |H⁻¹S|", "S̄0", "k1 − S̄0"]
+    columns += ["largest |d|", "residual |σ|", "largest |σ|", "t_smax [s]", "t_q [s]", "t_a [s]", "settling time [s]"]
+    caption = """d = σ̇ − law(σ) is the disturbance that the law meets, springs and a payload that the controller does
+        not know included; its largest size is that after the first quarter of the run, that of σ is of the second half.
         “Residual |σ|”: below it the law asks for less than the largest |d|, so that |σ| need not become smaller. ∞: no
         bound."""
     gaps = {gap: sum(gap in theory.gaps for _, _, theory in distinct.values()) for gap in Gap}
