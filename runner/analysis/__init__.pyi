@@ -10,6 +10,8 @@ from .crossings import Margins as Margins
 from .floquet import common_period as common_period
 from .floquet import floquet_exponent as floquet_exponent
 from .gain import equivalent_gain as equivalent_gain
+from .limit_cycle import LimitCycle as LimitCycle
+from .limit_cycle import limit_cycle as limit_cycle
 from .limits import limits_from as limits_from
 from .loop import AMPLITUDE as AMPLITUDE
 from .loop import Boundary as Boundary

@@ -86,7 +86,7 @@ class _Response:
         near = (upper.imag[:, None] + width[:, None] * _AROUND).ravel()
         even = np.geomspace(min(lowest, 0.1 * highest), highest, _EVENLY)
         found = np.unique(np.concatenate([even, near]))
-        return found[(found > 0.0) & (found < highest * (1 - 1e-9) if self.period else found <= highest)]
+        return found[(found >= even[0]) & (found < highest * (1 - 1e-9))]
 
 
 def _roots(f: Callable[[float], float], grid: Floats, values: Floats) -> list[float]:

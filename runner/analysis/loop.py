@@ -49,6 +49,7 @@ class LinearLoop:
     A, B       of the plant: dx = A x + B u
     Cx, Cz     of the control: u = Cx x + Cz z, a law by its equivalent gain
     Dx, Dz     of its states where it is continuous: dz = Dx x + Dz z
+    Sx, Sz     of the sliding variable: sigma = Sx x + Sz z; zero without one
     N          equivalent gain of u by sigma, (..., n, n); zero without a sliding variable
     law_gain   of the joints' accelerations by sigma, (..., n, n): on the diagonal the reaching law's slope, 1/s, less
                than zero
@@ -68,6 +69,8 @@ class LinearLoop:
     Cz: Floats
     Dx: Floats
     Dz: Floats
+    Sx: Floats
+    Sz: Floats
     N: Floats
     law_gain: Floats
     lag: Floats
@@ -157,7 +160,7 @@ def linear_loop(
     reach = control["u_s"]
     return LinearLoop(
         scenario, sizes, at, free, x, u, z, plant["A"], plant["B"],
-        control["u_x"], control["u_z"], control["dz_x"], control["dz_z"],
+        control["u_x"], control["u_z"], control["dz_x"], control["dz_z"], control["sigma_x"], control["sigma_z"],
         reach, _law_gain(scenario, free, x, reach), lag,
     )  # fmt: skip
 

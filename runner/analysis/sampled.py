@@ -157,7 +157,7 @@ def radius(loop: LinearLoop, period: float | None = None, delay: float | None = 
 
 def one_run(loop: LinearLoop, run: int) -> LinearLoop:
     """One of the runs of a loop."""
-    names = ("values", "x", "u", "z", "A", "B", "Cx", "Cz", "Dx", "Dz", "N", "law_gain", "lag")
+    names = ("values", "x", "u", "z", "A", "B", "Cx", "Cz", "Dx", "Dz", "Sx", "Sz", "N", "law_gain", "lag")
     changes = {name: getattr(loop, name)[run : run + 1] for name in names}
     return LinearLoop(scenario=loop.scenario, amplitude=loop.amplitude, times=loop.times, **changes)
 
