@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from springline.runner.analysis import confirm as by_runs
 from springline.runner.analysis.continuous import delta_critical, growth
 from springline.runner.analysis.crossings import Margins, delay_max, margins
-from springline.runner.analysis.cycle import Cycle, limit_cycle
 from springline.runner.analysis.floquet import floquet_exponent
+from springline.runner.analysis.limit_cycle import LimitCycle, limit_cycle
 from springline.runner.analysis.limits import limits_from
 from springline.runner.analysis.loop import Boundary, LinearLoop, linear_loop
 from springline.runner.analysis.modes import TimeScales, fast_gain, time_scales
@@ -39,6 +39,7 @@ SEPARATED = 0.1
 SLIM_GAIN, SLIM_PHASE = 2.0, math.radians(30.0)
 """Margins below which a stable loop is called so only just: 6 dB and 30 degrees."""
 
+_SMALL = 1e-6  # amplitude of sigma, where limit cycles begin
 _MOST_RANGES = 6
 _UNBOUNDED = 3.0  # gain at the least amplitude, by that at the scenario's: power laws have 30, bounded ones 1.1
 
@@ -83,7 +84,7 @@ class Analysis:
     notes: tuple[str, ...]
     status: str
     loop: LinearLoop
-    cycle: Cycle | None
+    cycle: LimitCycle | None
     proof: Proof | None
     damping: float
 
@@ -175,12 +176,15 @@ class _Work:
         low, high = (linear_loop(self.scenario, amplitude) for amplitude in AMPLITUDES)
         return low, high
 
+    def rate_of(self, loop: LinearLoop) -> float:
+        """Largest growth rate of a loop as it runs, 1/s."""
+        if self.sampled:
+            return math.log(max(float(radius(loop)[0]), 1e-300)) / self.period
+        return float(growth(loop)[0])
+
     @cached_property
     def rate(self) -> float:
-        """Largest growth rate of the loop as it runs, 1/s."""
-        if self.sampled:
-            return math.log(max(float(radius(self.loop)[0]), 1e-300)) / self.period
-        return float(growth(self.loop)[0])
+        return self.rate_of(self.loop)
 
     @property
     def unstable(self) -> bool:
@@ -205,8 +209,17 @@ class _Work:
         )
 
     @cached_property
-    def cycle(self) -> Cycle | None:
-        return limit_cycle(self.scenario, self.amplitude) if self.gained else None
+    def found_cycle(self) -> LimitCycle | None:
+        """What describing functions say, small oscillations growing or not."""
+        return limit_cycle(self.scenario) if self.gained else None
+
+    @cached_property
+    def cycle(self) -> LimitCycle | None:
+        """The limit cycle that the loop ends in however small it begins."""
+        found = self.found_cycle
+        if found is None or found.amplitude is None:
+            return None
+        return found if self.rate_of(linear_loop(self.scenario, _SMALL)) > 0.0 else None
 
     @cached_property
     def proof(self) -> tuple[Proof | None, str]:
@@ -509,27 +522,30 @@ def _phase_words(work: _Work, found: Margins, i: int, values: Floats) -> tuple[f
 
 
 def _cycle_text(work: _Work) -> str:
-    if work.cycle is None:
-        return "; none is predicted of a size above 1e-6"
-    return f"; predicted: sigma {work.cycle.amplitude:.3g} at {work.cycle.frequency:.4g} rad/s"
+    cycle = work.cycle
+    if cycle is None or cycle.amplitude is None:
+        return f"; none is predicted of a size above {_SMALL:g}"
+    return f"; predicted: sigma {float(cycle.amplitude.max()):.3g} at {cycle.frequency:.4g} rad/s"
 
 
 def _cycle(work: _Work) -> list[Row]:
     cycle = work.cycle
-    if cycle is None:
+    if cycle is None or cycle.amplitude is None or cycle.frequency is None:
         return []
-    joint = work.joints[cycle.joint]
+    k = int(np.argmax(cycle.amplitude))
     text = (
-        f"small oscillations grow and large ones die out: a limit cycle, mostly of the {joint.name}; sigma swings by "
-        f"{cycle.amplitude:.3g} at {cycle.frequency:.4g} rad/s. Raise control.delta or control.K_f, or sample faster"
+        f"small oscillations grow and large ones die out: a limit cycle, mostly of the {work.joints[k].name}; sigma "
+        f"swings by {cycle.amplitude[k]:.3g} at {cycle.frequency:.4g} rad/s. Raise control.delta or control.K_f, or "
+        "sample faster"
     )
     unit = " or ".join(dict.fromkeys(f"{item.unit}/s" for item in work.joints))
-    ok = bool(cycle.amplitude < AMPLITUDES[0])
-    return [
-        Row("limit_cycle_amplitude", cycle.amplitude, unit, ok, text),
-        Row("limit_cycle_frequency", cycle.frequency, "rad/s", ok, text),
-        Row(f"limit_cycle_amplitude_{joint.name}", cycle.amplitude, f"{joint.unit}/s", ok, text),
-        Row(f"limit_cycle_frequency_{joint.name}", cycle.frequency, "rad/s", ok, text),
+    rows = [
+        Row("limit_cycle_amplitude", float(cycle.amplitude[k]), unit, False, text),
+        Row("limit_cycle_frequency", cycle.frequency, "rad/s", False, text),
+    ]
+    return rows + [
+        Row(f"limit_cycle_amplitude_{joint.name}", float(size), f"{joint.unit}/s", False, f"sigma of the {joint.name}")
+        for joint, size in zip(work.joints, cycle.amplitude, strict=True)
     ]
 
 
@@ -555,26 +571,21 @@ def _confirmed(work: _Work, rows: Sequence[Row], report: Callable[[float], None]
         "period_max": by_runs.confirmed_period,
         "delay_max": by_runs.confirmed_delay,
     }
-    found = []
-    cycle: tuple[Floats, float, str] | None = None
+    found = list(rows)
     for k, row in enumerate(rows):
         if row.value is not None and row.name in finders:
-            value, how = finders[row.name](work_bench(work), row.value)
-            found.append(_beside(row, value, how))
-        elif row.value is not None and row.name.startswith("limit_cycle"):
-            assert work.cycle is not None
-            cycle = cycle or by_runs.confirmed_cycle(work_bench(work, work.cycle.amplitude))
-            size = float(cycle[0][work.cycle.joint]) if "amplitude" in row.name else cycle[1]
-            found.append(_beside(row, None if math.isnan(size) else size, cycle[2]))
-        else:
-            found.append(row)
+            value, how = finders[row.name](by_runs.bench(work.loop, work.amplitude), row.value)
+            found[k] = _beside(row, value, how)
         report((k + 1) / len(rows))
-    return found
-
-
-def work_bench(work: _Work, amplitude: float | None = None) -> by_runs.Bench:
-    """Where runs are held: where the loop is the least stable."""
-    return by_runs.bench(work.loop, work.amplitude if amplitude is None else amplitude)
+    if work.cycle is None or work.cycle.amplitude is None:
+        return found
+    sizes, frequency, how = by_runs.confirmed_cycle(by_runs.bench(work.loop, float(work.cycle.amplitude.max())))
+    seen = {f"limit_cycle_amplitude_{joint.name}": size for joint, size in zip(work.joints, sizes, strict=True)}
+    seen |= {"limit_cycle_amplitude": sizes.max(), "limit_cycle_frequency": frequency}
+    return [
+        _beside(row, None if math.isnan(seen[row.name]) else float(seen[row.name]), how) if row.name in seen else row
+        for row in found
+    ]
 
 
 def _beside(row: Row, value: float | None, how: str) -> Row:

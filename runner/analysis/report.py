@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from springline.codegen.files import canonical_json, write_tree
 from springline.runner.analysis.analysis import Analysis, mode_text
 from springline.runner.analysis.continuous import delta_critical
-from springline.runner.analysis.cycle import limit_cycle
 from springline.runner.analysis.figures import figures
+from springline.runner.analysis.limit_cycle import limit_cycle
 from springline.runner.analysis.modes import time_scales
 from springline.runner.analysis.reaching import LawCurves, law_curves
 from springline.runner.analysis.sensitivity import Sensitivities, sensitivities
@@ -116,10 +116,9 @@ def _chatter(scenario: Scenario, found: Analysis, names: Sequence[str]) -> list[
     result = []
     for name in names:
         for words, changes in ways:
-            cycle = limit_cycle(
-                scenario.with_overrides({"control.law": name, **changes}), found.scenario.sigma_amplitude
-            )
-            size, frequency = (cycle.amplitude, cycle.frequency) if cycle else (math.nan, math.nan)
+            cycle = limit_cycle(scenario.with_overrides({"control.law": name, **changes}))
+            size = math.nan if cycle.amplitude is None else float(cycle.amplitude.max())
+            frequency = math.nan if cycle.frequency is None else cycle.frequency
             result.append(Chatter(name, words, size, frequency))
     return result
 
