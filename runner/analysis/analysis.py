@@ -308,7 +308,7 @@ def _delta(work: _Work) -> list[Row]:
         return [Row(name, None, unit, False if work.unstable else None, text)]
     over = delta_critical(work.scenario, work.amplitude, columns=work.columns) if work.columns else ()
     most = max([boundary.value, *(item.value if item.value is not None else math.inf for item in over)])
-    ok = given > most
+    ok = bool(given > most)
     holds = _at(work, boundary, others, unit)
     if given <= boundary.value:
         verdict = (
@@ -438,7 +438,7 @@ def _fast_damping(work: _Work) -> list[Row]:
         f"{verdict}: {composite} 1/s in the closed loop, {alone} with fast control alone, {free} without; smallest K_f "
         f"for a damping of {work.damping:g} by fast control alone: {gains}"
     )
-    return [Row("fast_damping", value, "1", value > 0, text)]
+    return [Row("fast_damping", value, "1", bool(value > 0), text)]
 
 
 def _k1(work: _Work) -> list[Row]:
@@ -553,7 +553,7 @@ def _floquet(work: _Work) -> list[Row]:
     found = floquet_exponent(work.scenario, work.amplitude)
     if found.value is None:
         return [Row("floquet_exponent", None, "1/s", None, found.reason)]
-    stable = found.value < 0
+    stable = bool(found.value < 0)
     verdict = (
         "disturbances of the periodic motion die out" if stable else "unstable: they grow along the periodic motion"
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from springline.codegen.files import canonical_json, write_tree
 from springline.runner.analysis.analysis import Analysis, mode_text
-from springline.runner.analysis.continuous import delta_critical
+from springline.runner.analysis.continuous import delta_critical, spectrum
 from springline.runner.analysis.figures import figures
 from springline.runner.analysis.limit_cycle import limit_cycle
 from springline.runner.analysis.modes import time_scales
@@ -113,10 +113,12 @@ def _chatter(scenario: Scenario, found: Analysis, names: Sequence[str]) -> list[
         period = round(largest / 2 / scenario.step) * scenario.step
         if period > 0:
             ways.append((f"sampled at {period:.3g} s", {"control.mode": "sampled", "control.period": period}))
+    worst = int(spectrum(found.loop).real.max(axis=-1)[0].argmax())
+    times = [float(found.loop.times[worst])]
     result = []
     for name in names:
         for words, changes in ways:
-            cycle = limit_cycle(scenario.with_overrides({"control.law": name, **changes}))
+            cycle = limit_cycle(scenario.with_overrides({"control.law": name, **changes}), times=times)
             size = math.nan if cycle.amplitude is None else float(cycle.amplitude.max())
             frequency = math.nan if cycle.frequency is None else cycle.frequency
             result.append(Chatter(name, words, size, frequency))

@@ -153,6 +153,7 @@ def test_json() -> None:
     assert answer["units"]["delay_max"] == "s"
 
 
+@pytest.mark.full
 def test_the_report(tmp_path: Path) -> None:
     arguments = ["analyze", "paper/nominal", "-o", str(tmp_path / "out"), "--set", "simulation.duration=1.0"]
     result = CliRunner().invoke(app, arguments)
@@ -167,7 +168,7 @@ def test_the_report(tmp_path: Path) -> None:
 
 
 def test_an_equivalent_gain_by_hand() -> None:
-    """The describing function of |s|^(1/2) sgn s is 1.113 A^(-1/2): 4/pi times the integral of sin^(3/2) over a quarter."""
+    """The describing function of |s|^(1/2) sgn s is 4/pi times the integral of sin^(3/2) over a quarter of a turn."""
     from springline.runner.analysis import equivalent_gain
 
     found = float(equivalent_gain(lambda s: np.sqrt(np.abs(s)) * np.sign(s), 0.01))
