@@ -13,7 +13,6 @@ from .gain import equivalent_gain as equivalent_gain
 from .limit_cycle import LimitCycle as LimitCycle
 from .limit_cycle import limit_cycle as limit_cycle
 from .limits import limits_from as limits_from
-from .loop import AMPLITUDE as AMPLITUDE
 from .loop import Boundary as Boundary
 from .loop import linear_loop as linear_loop
 from .loop import LinearLoop as LinearLoop

@@ -12,12 +12,14 @@ import pytest
 from typer.testing import CliRunner
 
 import springline as sl
-from springline.runner.analysis import Analysis
+from springline.runner.analysis import Analysis, equivalent_gain
 from springline.runner.cli import app
 from springline.runner.files import InputError
 
-NAMES = ("delta_critical", "period_max", "delay_max", "epsilon_ratio", "fast_damping", "k1_margin", "gain_margin")
-NAMES += ("phase_margin",)
+NAMES = (
+    *("delta_critical", "period_max", "delay_max", "epsilon_ratio", "fast_damping"),
+    *("k1_margin", "gain_margin", "phase_margin"),
+)
 SAMPLED = {"control.mode": "sampled", "control.period": 0.001}
 
 
@@ -169,7 +171,5 @@ def test_the_report(tmp_path: Path) -> None:
 
 def test_an_equivalent_gain_by_hand() -> None:
     """The describing function of |s|^(1/2) sgn s is 4/pi times the integral of sin^(3/2) over a quarter of a turn."""
-    from springline.runner.analysis import equivalent_gain
-
     found = float(equivalent_gain(lambda s: np.sqrt(np.abs(s)) * np.sign(s), 0.01))
     assert found == pytest.approx(1.1128 / np.sqrt(0.01), rel=1e-3)
