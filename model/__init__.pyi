@@ -6,6 +6,9 @@ from .control import Control as Control
 from .control import Controller as Controller
 from .control import Law as Law
 from .control import Observer as Observer
+from .linearisation import CONTROL_INPUTS as CONTROL_INPUTS
+from .linearisation import Linearisation as Linearisation
+from .linearisation import linearisation_of as linearisation_of
 from .mechanisms import Body as Body
 from .mechanisms import Link as Link
 from .mechanisms import Mechanism as Mechanism

@@ -1,3 +1,4 @@
+from .analysis import analyze as analyze
 from .files import InputError as InputError
 from .run import simulate as simulate
 from .scenario import load_scenario as load_scenario

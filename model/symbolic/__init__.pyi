@@ -8,4 +8,5 @@ from .linear import solve_spd as solve_spd
 from .normal_form import TooManyTerms as TooManyTerms
 from .normal_form import collect as collect
 from .runs import over_runs as over_runs
+from .values import replaced_values as replaced_values
 from .zeros import without as without

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from springline.model.symbolic.derivation import as_written
+
 
 @dataclass(frozen=True, slots=True)
 class Value:
@@ -83,3 +85,20 @@ def written(value: Value, arguments: Sequence[ca.SX]) -> ca.SX:
     if len(arguments) == 1:
         return ca.SX.unary(value.op, *arguments)
     return ca.SX.binary(value.op, *arguments)
+
+
+def replaced_values(results: Sequence[ca.SX], old: ca.SX, new: ca.SX) -> list[ca.SX]:
+    """Results, with `new` wherever an entry of the column `old` is computed in them; what it alone needs drops out.
+
+    Unlike a substitution it replaces values, not symbols. An entry of `old` that is a constant stays.
+    """
+    shapes = [item.shape for item in results]
+    values, places = listed(ca.vertcat(stacked(results), ca.densify(old)), [])
+    count = len(places) - old.numel()
+    given = dict(zip(places[count:], ca.vertsplit(new), strict=True))
+    rewritten: list[ca.SX] = []
+    with as_written():
+        for k, value in enumerate(values):
+            stays = k not in given or value.constant is not None
+            rewritten.append(written(value, [rewritten[i] for i in value.arguments]) if stays else given[k])
+    return unstacked([rewritten[k] for k in places[:count]], shapes)

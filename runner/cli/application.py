@@ -22,7 +22,7 @@ from typer.core import TyperGroup
 from springline.codegen.export import targets
 from springline.codegen.files import FolderConflict
 from springline.codegen.kernel import ToolchainError
-from springline.runner.cli.commands import batch, doctor, fmu, generate, listing, reproduce, run, target
+from springline.runner.cli.commands import analyze, batch, doctor, fmu, generate, listing, reproduce, run, target
 from springline.runner.cli.terminal import complain, say
 from springline.runner.files import InputError
 
@@ -85,6 +85,7 @@ export.command("fmu3")(fmu.export_fmu3)
 for name, found in targets().items():
     export.command(name)(target.target_command(name, found))
 app.add_typer(export, name="export")
+app.command("analyze")(analyze.analyze)
 app.command("reproduce")(reproduce.reproduce)
 for entry in sorted(entry_points(group="springline.commands"), key=lambda entry: entry.name):
     app.command(entry.name)(entry.load())

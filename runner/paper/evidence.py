@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from springline.model.theory import Gap, Margin, SettlingBounds
+from springline.runner.analysis import Proof
 from springline.runner.paper.cases import CASES, JOINTS, Case
 from springline.runner.paper.measured import Floats, Measured
 
@@ -75,23 +75,6 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Theory:
-    """Section 6 for one run.
-
-    margin    k1 - S0, with S0 measured along the run;  bounds  t_smax, t_q, t_a
-    gaps      where the proof does not reach this run (E9)
-    residual  per joint, the |sigma| below which the law is no larger than the disturbance met
-    tail      rate at which e decays once |e| << delta, 1/s
-    """
-
-    margin: Margin
-    bounds: SettlingBounds
-    gaps: tuple[Gap, ...]
-    residual: tuple[float, ...]
-    tail: float
-
-
-@dataclass(frozen=True, slots=True)
 class Inherent:
     """What mechanism and surface say by themselves, which no choice of inputs changes (E5, E10).
 
@@ -127,7 +110,7 @@ class Evidence:
     """
 
     runs: Mapping[str, Measured]
-    theory: Mapping[str, Theory]
+    theory: Mapping[str, Proof]
     laws: Mapping[str, Callable[[Floats], Floats]]
     inherent: Inherent
     linear: Mapping[str, Measured]

@@ -10,11 +10,12 @@ import numpy as np
 
 from springline.model.base import COORDINATES
 from springline.model.theory import Gap, reaching_time_bound
+from springline.runner.analysis import Proof
 from springline.runner.files import value_text
 from springline.runner.paper.captions import SEEN
 from springline.runner.paper.cases import CASES, JOINTS, LAWS, MEASURES, UNIT, Case, cases
 from springline.runner.paper.claims import CHATTER_ABOVE
-from springline.runner.paper.evidence import Evidence, Finding, Theory
+from springline.runner.paper.evidence import Evidence, Finding
 from springline.runner.paper.figures import FIGURES, OPEN_FIGURES, PaperFigure
 from springline.runner.paper.measured import Measured, first_time
 from springline.runner.paper.numbers import change, number, plain
@@ -276,7 +277,7 @@ def _claims(findings: Iterable[Finding]) -> list[Block]:
 
 def _theory(study: Study) -> list[Block]:
     # Cases that are the same run under another name are listed once.
-    distinct: dict[int, tuple[Case, Measured, Theory]] = {}
+    distinct: dict[int, tuple[Case, Measured, Proof]] = {}
     for case in cases(study.groups):
         run, theory = study.evidence.runs[case.scenario], study.evidence.theory.get(case.scenario)
         if theory is not None:
@@ -289,15 +290,21 @@ def _theory(study: Study) -> list[Block]:
                 margin.per_joint[i],
                 margin.bound,
                 margin.c1,
+                theory.disturbed.per_joint[i],
                 theory.residual[i],
+                theory.remaining[i],
                 bounds.sliding[i],
                 bounds.reaching,
                 bounds.total[i],
                 run.metric("settling_time", joint),
             )
             rows.append((f"{case.group}", case.name, joint, *map(number, values)))
-    columns = ["group", "case", "joint", "largest |H⁻¹S|", "S̄0", "k1 − S̄0", "residual |σ|"]
-    columns += ["t_smax [s]", "t_q [s]", "t_a [s]", "settling time [s]"]
+    columns = ["group", "case", "joint", "largest |H⁻¹S|", "S̄0", "k1 − S̄0"]
+    columns += ["largest |d|", "residual |σ|", "largest |σ|", "t_smax [s]", "t_q [s]", "t_a [s]", "settling time [s]"]
+    caption = """d = σ̇ − law(σ) is the disturbance that the law meets, springs and a payload that the controller does
+        not know included; its largest size is that after the first quarter of the run, that of σ is of the second half.
+        “Residual |σ|”: below it the law asks for less than the largest |d|, so that |σ| need not become smaller. ∞: no
+        bound."""
     gaps = {gap: sum(gap in theory.gaps for _, _, theory in distinct.values()) for gap in Gap}
     items = [f"{count} of {len(distinct)} runs: {gap.value}." for gap, count in gaps.items() if count]
     items += [
@@ -316,7 +323,7 @@ def _theory(study: Study) -> list[Block]:
         Table(
             columns,
             rows,
-            "“Residual |σ|”: below it the law asks for less than the disturbance met. ∞: no bound.",
+            " ".join(caption.split()),
             labels=3,
         ),
         Text("Where the proof does not reach these runs:"),

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from os import cpu_count
 from threading import Lock
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pyarrow as pa
 
 from springline.codegen.kernel import ONE_RUN, KernelSpec, LoopSettings, Watch, kernel
 from springline.codegen.program import program
-from springline.model import theory
 from springline.model.control import SurfaceExponents
 from springline.model.structure import Structure
-from springline.model.system import System
+from springline.model.theory import felt_acceleration
+from springline.runner.analysis import proof_of, reaching_law, signals_along
 from springline.runner.files import InputError, Problem
 from springline.runner.paper.cases import LAWS, cases
-from springline.runner.paper.evidence import Evidence, Inherent, Theory
+from springline.runner.paper.evidence import Evidence, Inherent
 from springline.runner.paper.measured import Floats, Measured
 from springline.runner.run import Crew, Progress, Result, results, simulate, trajectory_table
 from springline.runner.scenario import Scenario, load_scenario
@@ -30,9 +29,6 @@ Overrides = Mapping[str, Any]
 
 ROW_INTERVAL = 2e-4
 """Time between trajectory rows, s: 30 of them in a period of the springs' slowest oscillation."""
-
-_EVERY = 5
-"""Rows between two at which the disturbance is evaluated: it does not change much in a millisecond."""
 
 LINEAR_GAIN = 5.0
 """1/s. Coefficient c of the linear surface sigma = de/dt + c e of Figure 5, which the paper does not publish: ours."""
@@ -182,7 +178,7 @@ def study(
         return Evidence(
             runs=measured,
             theory={
-                name: theory_of(scenarios["case", name, half], run)
+                name: proof_of(scenarios["case", name, half], run.columns)
                 for name, run in measured.items()
                 if run.status == "ok"
             },
@@ -268,29 +264,11 @@ def measure(scenario: Scenario, result: Result) -> Measured:
 def with_velocities(scenario: Scenario, run: Measured) -> Measured:
     """The run with the wished velocities and their errors beside its columns."""
     system, columns = scenario.system(), dict(run.columns)
-    wished = _signals(system, scenario, run["t"])[system.n : 2 * system.n]
+    wished = signals_along(scenario, run["t"])[system.n : 2 * system.n]
     for joint, rate in zip(system.joints, wished, strict=True):
         columns[f"dq1d_{joint.name}"] = rate
         columns[f"velocity_error_{joint.name}"] = rate - columns[f"dq1_{joint.name}"]
     return replace(run, columns=columns)
-
-
-def _signals(system: System, scenario: Scenario, t: Floats) -> Floats:
-    """w = [q1d, dq1d, ddq1d, b, db, ddb] along time, one column a sample (analytic signals only: no tables)."""
-    values: Floats = system.function("signals")(t[None, :], ca.DM.zeros(0, 1), scenario.values()).full()
-    return values
-
-
-def reaching_law(scenario: Scenario) -> Callable[[Floats], Floats]:
-    """d sigma / dt that the scenario's law asks for, without the limit a_max, as a function of an array of sigma."""
-    system, structure, values = scenario.system(), scenario.structure(), scenario.values()
-    law = system.function(f"law_{structure.law}")
-
-    def rate(sigma: Floats) -> Floats:
-        asked: Floats = law(np.atleast_1d(sigma)[None, :], values).full()[0]
-        return asked
-
-    return rate
 
 
 def inherent_of(scenario: Scenario) -> Inherent:
@@ -302,7 +280,7 @@ def inherent_of(scenario: Scenario) -> Inherent:
     q = np.array([np.zeros_like(angles), angles])
     force = system.function("base_disturbance")(still, still, heave, q, np.zeros_like(q), values).full()
     mass = system.function("slow_mass")(q, values).full()
-    felt = theory.felt_acceleration(mass.reshape(system.n, -1, system.n).swapaxes(0, 1), force)
+    felt = felt_acceleration(mass.reshape(system.n, -1, system.n).swapaxes(0, 1), force)
     printed = values.copy()
     printed[[slot.key for slot in system.slots].index("control.delta")] = 0.0
 
@@ -316,49 +294,6 @@ def inherent_of(scenario: Scenario) -> Inherent:
         return size
 
     return Inherent(angles, felt, partial(at_rest, p=values), partial(at_rest, p=printed))
-
-
-def theory_of(scenario: Scenario, run: Measured) -> Theory:
-    """The bounds of section 6 for one run, with S0 measured along it, and where the proof does not reach it (E9)."""
-    system, structure, values = scenario.system(), scenario.structure(), scenario.values()
-    p = dict(zip((slot.key for slot in system.slots), values, strict=True))
-    per_joint = range(system.n)
-    q, dq, sigma = (
-        np.array([run[f"{name}_{joint.name}"][::_EVERY] for joint in system.joints]) for name in ("q1", "dq1", "sigma")
-    )
-    w = _signals(system, scenario, run["t"][::_EVERY])
-    base = np.split(w[3 * system.n :], 3)
-    disturbance = system.function("base_disturbance")(*base, q, dq, values).full()
-    mass = system.function("slow_mass")(q, values).full()  # H of each sample side by side
-    felt = theory.felt_acceleration(mass.reshape(system.n, -1, system.n).swapaxes(0, 1), disturbance)
-    margin = theory.margin(felt, p["control.k1"])
-    rate = reaching_law(scenario)
-    limits = np.array([p[f"control.a_max.{i}"] for i in per_joint])
-    clipped = bool(np.any(np.abs([rate(row) for row in sigma]) > limits[:, None]))
-    bounds = theory.settling_bounds(
-        sigma[:, 0],
-        margin.c1,
-        p["control.zeta"],
-        [p[f"control.mu.{i}"] for i in per_joint],
-        p["control.lambda"],
-        structure.exponents,
-    )
-    delta = p["control.delta"]
-
-    def clipped_law(limit: float) -> Callable[[float], float]:
-        return lambda s: min(abs(float(rate(np.array([s]))[0])), limit)
-
-    residual = [
-        theory.residual_set(clipped_law(limit), float(bound))
-        for limit, bound in zip(limits, margin.per_joint, strict=True)
-    ]
-    return Theory(
-        margin,
-        bounds,
-        theory.gaps(margin, delta, clipped, structure.law),
-        tuple(residual),
-        theory.tail_rate(p["control.lambda"], delta, structure.exponents),
-    )
 
 
 def _linear_structure(scenario: Scenario) -> Structure:

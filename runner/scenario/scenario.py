@@ -143,6 +143,11 @@ class Scenario:
         return float(self._simulation.get("settling_error", 0.0))
 
     @property
+    def sigma_amplitude(self) -> float:
+        """Amplitude of sigma at which the reaching law counts as a gain, SI."""
+        return float(self.document["analysis"]["sigma_amplitude"])
+
+    @property
     def seed(self) -> int:
         """What the noise of sensors is drawn with."""
         return int(self.document["sensor"]["seed"])
@@ -509,7 +514,7 @@ class Scenario:
                 table: {k: v for k, v in document[table].items() if not isinstance(v, list)}
                 for table in ("sensor", "actuator")
             }
-            document = {name: document[name] for name in ("base_motion", "simulation")}
+            document = {name: document[name] for name in ("base_motion", "analysis", "simulation")}
             document |= {"control": control} | hardware
             document["drive"] = {"kind": drive}
         elif overrides.get(f"mechanism.{schema.SIZE}", self.structure().size) != self.structure().size:

@@ -344,6 +344,12 @@ class Simulation(Section):
     settling_error: Annotated[float | None, number("SI", POSITIVE)] = None
 
 
+class Analysis(Section):
+    """[analysis]: the amplitude of sigma at which the reaching law counts as a gain."""
+
+    sigma_amplitude: Annotated[float, number("SI", POSITIVE)] = 0.1
+
+
 BANDS = (("response_band", "response_error"), ("settling_band", "settling_error"))
 """Keys of [simulation] that exclude each other."""
 DEFAULT_BANDS = {"response_band": 0.10, "settling_band": 0.05}
@@ -374,6 +380,7 @@ TABLES = (
         "disturbance",
         "initial",
     ),
+    "analysis",
     "simulation",
 )
 
@@ -442,6 +449,7 @@ def schema(
             "sensor": _section("sensor", _sensor(joints)),
             "actuator": _section("actuator", _actuator(joints)),
             "initial": _section("initial", initial),
+            "analysis": Analysis,
             "simulation": Simulation,
         },
         kinds={

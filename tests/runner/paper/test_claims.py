@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from springline.model.theory import Margin, SettlingBounds
+from springline.runner.analysis import Proof
 from springline.runner.paper.cases import CASES, JOINTS, LAWS
 from springline.runner.paper.claims import CLAIMS
-from springline.runner.paper.evidence import Check, Evidence, Finding, Inherent, Theory, judge
+from springline.runner.paper.evidence import Check, Evidence, Finding, Inherent, judge
 from springline.runner.paper.measured import Floats, Measured, first_time, lasting_time
 
 STEP = 1e-3
@@ -59,12 +60,12 @@ def fluttering(rate: float = 20.0, frequency: float = 150.0, start: float = 1e-9
     return Measured(columns, calm.metrics, "out_of_bounds", "out_of_bounds: too fast")
 
 
-def theory(margin: float) -> Theory:
+def theory(margin: float) -> Proof:
     sliding = np.array([0.342, 0.4])
     reaching = 12.6 / margin if margin > 0 else math.inf
-    return Theory(
-        Margin(np.array([2.0, 1.0]), 3 - margin, margin), SettlingBounds(sliding, reaching), (), (0.1, 0.1), 36.8
-    )
+    felt = Margin(np.array([2.0, 1.0]), 3 - margin, margin)
+    bounds = SettlingBounds(sliding, reaching)
+    return Proof(felt, felt, bounds, (), (0.1, 0.1), (0.1, 0.1), (0.0, 0.0), tail=36.8)
 
 
 def law_run(law: str) -> Measured:

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 
 from springline.codegen.files import FolderConflict
+from springline.runner.analysis import reaching_law
 from springline.runner.files import InputError
 from springline.runner.paper import GROUPS, reproduce, reproduction
 from springline.runner.paper.captions import SEEN
@@ -37,8 +38,6 @@ from springline.runner.paper.runs import (
     Experiment,
     inherent_of,
     measure,
-    reaching_law,
-    theory_of,
     with_velocities,
 )
 from springline.runner.run import simulate
@@ -215,22 +214,6 @@ def test_experiments_on_sampling_and_on_the_step_are_runs_of_their_own() -> None
 def seen_of(experiment: Experiment) -> Measured:
     scenario = load_scenario(experiment.scenario, dict(experiment.overrides))
     return measure(scenario, simulate(scenario))
-
-
-# Theory
-
-
-def test_the_theory_is_measured_along_the_run() -> None:
-    scenario = load_scenario("paper/group1_roll")
-    run = measure(scenario, simulate(scenario))
-    found = theory_of(scenario, run)
-    assert found.bounds.sliding == pytest.approx([0.342, 0.400], abs=5e-4)
-    assert found.margin.c1 == pytest.approx(3 - found.margin.bound)
-    assert 0 < found.margin.bound < 1
-    assert found.tail == pytest.approx(36.8, abs=0.1)
-    # The law asks for the disturbance at the edge of the residual set.
-    edge = np.abs(reaching_law(scenario)(np.array(found.residual)))
-    assert edge == pytest.approx(found.margin.per_joint, rel=1e-6)
 
 
 def test_velocity_errors_are_those_of_the_reference() -> None:

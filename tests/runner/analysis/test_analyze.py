@@ -1,0 +1,175 @@
+"""The face of the analysis: verdicts with their numbers, in words, confirmed by runs, and wrong use told at once."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import springline as sl
+from springline.runner.analysis import Analysis, equivalent_gain
+from springline.runner.cli import app
+from springline.runner.files import InputError
+
+NAMES = (
+    *("delta_critical", "period_max", "delay_max", "epsilon_ratio", "fast_damping"),
+    *("k1_margin", "gain_margin", "phase_margin"),
+)
+SAMPLED = {"control.mode": "sampled", "control.period": 0.001}
+
+
+@cache
+def analysed(name: str = "paper/nominal", **overrides: Any) -> Analysis:
+    changes = {key.replace("__", "."): value for key, value in overrides.items()}
+    return sl.analyze(sl.load_scenario(name, changes))
+
+
+def value(found: Analysis, name: str) -> float:
+    number = found.row(name).value
+    assert number is not None, found.row(name).text
+    return number
+
+
+def test_the_paper_s_arm() -> None:
+    """E3, E11, E13 of docs/paper.md."""
+    found = analysed()
+    assert found.status == "ok"
+    assert 0.0255 < value(found, "delta_critical") < 0.028
+    assert value(found, "period_max") == pytest.approx(0.002, rel=0.05)
+    assert value(found, "fast_damping") == pytest.approx(9 / 1022, rel=0.1)
+    assert "-50 ± " in found.row("fast_damping").text
+    assert value(found, "epsilon_ratio") == pytest.approx(42 / 1020, rel=0.05)
+    assert value(found, "k1_margin") == pytest.approx(3.0, abs=0.01)
+    assert value(found, "floquet_exponent") < -5.0
+    assert all(found.row(name).text for name in NAMES)
+    assert {f"{name}_{joint}" for name in NAMES[5:] for joint in ("lift", "rotation")} <= {r.name for r in found.rows}
+    assert "at sigma amplitude 0.1" in found.row("delta_critical").text
+    assert "over 0.0001 … 0.5" in found.row("delta_critical").text
+
+
+def test_a_delta_that_is_too_small_is_called_unstable() -> None:
+    found = analysed(control__delta=0.02)
+    assert found.status == "unstable"
+    for name in ("delta_critical", "period_max", "delay_max", "gain_margin", "phase_margin", "fast_damping"):
+        assert found.row(name).ok is False
+        assert "unstable" in found.row(name).text
+    assert found.row("delta_critical").value == pytest.approx(value(analysed(), "delta_critical"))
+
+
+def test_without_fast_control_no_delta_is_stable() -> None:
+    row = analysed(control__fast=False).row("delta_critical")
+    assert (row.value, row.ok) == (None, False)
+    assert "unstable" in row.text
+
+
+def test_a_sampled_control_is_judged_by_its_period_and_delay() -> None:
+    found = analysed(**{key.replace(".", "__"): item for key, item in SAMPLED.items()})
+    assert found.row("period_max").ok is True
+    assert value(found, "delay_max") < 0.001
+    slow = {"control__mode": "sampled", "control__period": 0.0021, "simulation__duration": 4.2}
+    late = analysed(**slow).row("period_max")
+    assert late.ok is False
+    assert late.text.startswith("unstable")
+
+
+def test_a_law_whose_gain_has_no_bound_ends_in_a_limit_cycle() -> None:
+    found = analysed(control__law="power")
+    for name in ("delta_critical", "period_max", "delay_max"):
+        assert found.row(name).value is None
+        assert "no finite boundary" in found.row(name).text
+    assert 1e-3 < value(found, "limit_cycle_amplitude") < 1e-2
+    assert value(found, "limit_cycle_frequency") == pytest.approx(1020, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "absent"),
+    [
+        ("controllers/computed_torque", {}, {"delta_critical", "k1_margin", "floquet_exponent"}),
+        ("paper/nominal", {"drive__kind": "rigid"}, {"epsilon_ratio", "fast_damping", "delta_critical"}),
+    ],
+)
+def test_what_does_not_apply_is_null_and_says_why(name: str, overrides: dict[str, Any], absent: set[str]) -> None:
+    found = analysed(name, **overrides)
+    for row in (found.row(key) for key in absent):
+        assert row.value is None
+        assert row.ok is None
+        assert row.text
+
+
+def test_three_links() -> None:
+    found = analysed(mechanism__name="planar_arm", mechanism__n=3)
+    assert {f"gain_margin_joint{k}" for k in (1, 2, 3)} <= {row.name for row in found.rows}
+    assert 0.0 < value(found, "epsilon_ratio") < 1.0
+
+
+def test_a_range_is_searched_for_its_worst() -> None:
+    scenario = sl.load_scenario("paper/nominal", {"control.delta": 0.03})
+    row = sl.analyze(scenario, {"plant.m3.scale": (0.8, 1.2)}).row("delta_critical")
+    assert row.ok is False  # stable with the arm as it is believed to be, but not with a light payload
+    assert "worst at plant.m3.scale = 0.8" in row.text
+    assert row.value == pytest.approx(value(analysed(), "delta_critical"))
+
+
+def test_runs_find_the_boundaries_of_the_paper_s_arm() -> None:
+    found = sl.analyze(sl.load_scenario("paper/nominal"), confirm=True)
+    for name in ("delta_critical", "period_max", "delay_max"):
+        row = found.row(name)
+        assert row.confirmed == pytest.approx(row.value, rel=0.05)
+        assert "Runs: " in row.text
+    assert found.row("k1_margin").confirmed is None
+
+
+@pytest.mark.parametrize(
+    ("ranges", "told"),
+    [
+        ({"plant.m33.scale": (0.8, 1.2)}, "plant.m3.scale"),
+        ({"plant.m3.scale": (1.2, 0.8)}, "LOW < HIGH"),
+        ({"plant.m3.scale": (-0.8, 1.2)}, "> 0"),
+        ({"control.delta": (0.05, float("inf"))}, "finite"),
+    ],
+)
+def test_wrong_ranges_are_told(ranges: dict[str, tuple[float, float]], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        sl.analyze(sl.load_scenario("paper/nominal"), ranges)
+
+
+@pytest.mark.parametrize("text", ["plant.m33=0.8,1.2", "plant.m3.scale=1", "plant.m3.scale", "plant.m3.scale=2,1"])
+def test_wrong_use_is_exit_2_and_writes_nothing(text: str, tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["analyze", "paper/nominal", "--range", text, "-o", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_json() -> None:
+    result = CliRunner().invoke(app, ["analyze", "paper/nominal", "--json"])
+    assert result.exit_code == 0
+    answer = json.loads(result.stdout)
+    assert set(answer) == {"command", "version", "status", "rows", "units"}
+    assert set(NAMES) <= {row["name"] for row in answer["rows"]}
+    assert all(set(row) == {"name", "value", "unit", "ok", "text", "confirmed"} for row in answer["rows"])
+    assert answer["units"]["delay_max"] == "s"
+
+
+@pytest.mark.full
+def test_the_report(tmp_path: Path) -> None:
+    arguments = ["analyze", "paper/nominal", "-o", str(tmp_path / "out"), "--set", "simulation.duration=1.0"]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    figures = {file.stem for file in (tmp_path / "out/figures").glob("*.png")}
+    assert figures == {"spectrum", "reference", "channels", "laws", "tornado"}
+    stored = json.loads((tmp_path / "out/analysis.json").read_text())
+    assert {row["name"] for row in stored["rows"]} >= set(NAMES)
+    assert "smallest stable" in (tmp_path / "out/report.md").read_text()
+    again = CliRunner().invoke(app, ["run", "paper/nominal", "-o", str(tmp_path / "out")])
+    assert again.exit_code == 2
+
+
+def test_an_equivalent_gain_by_hand() -> None:
+    """The describing function of |s|^(1/2) sgn s is 4/pi times the integral of sin^(3/2) over a quarter of a turn."""
+    found = float(equivalent_gain(lambda s: np.sqrt(np.abs(s)) * np.sign(s), 0.01))
+    assert found == pytest.approx(1.1128 / np.sqrt(0.01), rel=1e-3)
