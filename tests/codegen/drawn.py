@@ -200,6 +200,9 @@ def loops(draw: st.DrawFn, controllers: tuple[str, ...] = (OWN, *CONTROLLERS), h
     frictions = [item.name for item in FRICTION if drive == "elastic" or item.name.startswith("link")]
     effects = [effect.name for effect in (*SENSORS, *ACTUATORS)]
     chosen = draw(st.sets(st.sampled_from(effects))) if hardware else set()
+    differenced = draw(st.booleans()) if hardware else False
+    if differenced:
+        chosen.discard("velocity_noise")  # there are no measured rates
     rubbing = draw(st.sets(st.sampled_from(frictions)))
     structure = Structure(
         mechanism=mechanism,
@@ -222,6 +225,7 @@ def loops(draw: st.DrawFn, controllers: tuple[str, ...] = (OWN, *CONTROLLERS), h
         friction=tuple(name for name in frictions if name in rubbing),
         effects=tuple(name for name in effects if name in chosen),
         delay=draw(st.sampled_from([0, 1, 7, 13])) if hardware else 0,
+        differenced=differenced,
         **_driven(draw(st.sampled_from(["command", "spring"])), drive),
     )
     return Loop(structure, recipe, draw(SEEDS))
@@ -242,6 +246,7 @@ _CHOSEN = {
     "position_noise": (0.0, 1e-4),
     "velocity_noise": (0.0, 1e-3),
     "position_resolution": (0.0, 1e-4),
+    "velocity_cutoff": (np.inf, 2000.0),
     "lag": (0.0, 3e-4, 2e-3),
     "rate_limit": (np.inf, 2e4, 3e3),
     "U_max": (np.inf, 300.0, 20.0),
