@@ -43,7 +43,9 @@ class Linearisation:
     def plant(self) -> ca.Function:
         """dx (nx x 1), by x (nx x nx), by u (nx x n)."""
         system = self.system
-        x, u, p = (ca.SX.sym(name, symbol.numel()) for name, symbol in (("x", system.x), ("u", system.u), ("p", system.p)))
+        x, u, p = (
+            ca.SX.sym(name, symbol.numel()) for name, symbol in (("x", system.x), ("u", system.u), ("p", system.p))
+        )
         w = ca.SX.sym("w", system.w.numel())
         dx = system.function("loop_plant")(w, x, u, p)
         results = [dx, ca.jacobian(dx, x), ca.jacobian(dx, u)]
@@ -81,7 +83,9 @@ class Linearisation:
         """u, dz, ahead, sigma, each followed by its derivatives by x and z."""
         s, results, sigma, _ = self._written
         x, z = self.system.x, self.system.z
-        outputs = [item for value in (*results, sigma) for item in (value, ca.jacobian(value, x), ca.jacobian(value, z))]
+        outputs = [
+            item for value in (*results, sigma) for item in (value, ca.jacobian(value, x), ca.jacobian(value, z))
+        ]
         names = [f"{name}{by}" for name in ("u", "dz", "ahead", "sigma") for by in ("", "_x", "_z")]
         return self._function("linear_control", s, outputs, names)
 

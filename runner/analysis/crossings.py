@@ -215,6 +215,7 @@ def _boundaries(response: _Response) -> tuple[list[tuple[float, float]], list[tu
         except np.linalg.LinAlgError:  # an integrator: the response has no bound there, and no gain a boundary
             continue
     phases = [
-        (abs(float(np.angle(at(omega)))), omega) for omega in _roots(lambda w: abs(at(w)) - 1.0, grid, np.abs(values) - 1.0)
+        (abs(float(np.angle(at(omega)))), omega)
+        for omega in _roots(lambda w: abs(at(w)) - 1.0, grid, np.abs(values) - 1.0)
     ]
     return [(1 / here, omega) for here, omega in gains if 1 / _FARTHEST < here < _FARTHEST], phases

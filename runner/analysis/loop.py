@@ -123,9 +123,7 @@ def _padded(rows: Floats, n: int) -> Floats:
 
 def joined(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
     """[[a, b], [c, d]] of stacks of matrices."""
-    result: Floats = np.concatenate(
-        [np.concatenate([a, b], axis=-1), np.concatenate([c, d], axis=-1)], axis=-2
-    )
+    result: Floats = np.concatenate([np.concatenate([a, b], axis=-1), np.concatenate([c, d], axis=-1)], axis=-2)
     return result
 
 
@@ -240,9 +238,7 @@ def _table_rows(scenario: Scenario, times: Floats) -> Floats:
     return np.concatenate(columns, axis=1)
 
 
-def _operating_points(
-    scenario: Scenario, values: Floats, times: Floats
-) -> tuple[Floats, Floats, dict[str, Floats]]:
+def _operating_points(scenario: Scenario, values: Floats, times: Floats) -> tuple[Floats, Floats, dict[str, Floats]]:
     """x and u that keep the arm on its reference, and the plant's matrices there."""
     n, runs, count = scenario.system().n, len(values), len(times)
     function = linearised(scenario).plant
