@@ -1,8 +1,8 @@
 """The loop linearised, symbolically: plant and control by automatic differentiation, a law by what stands before it.
 
 Differentiated where the error is zero, a law of sigma is not seen at all, or has no bound. So the controller is cut at
-its sliding variable: new symbols s stand for sigma in all that it computes, and the loop has, with the equivalent gain N
-of the command by s at some amplitude (its describing function, which is a matter of numbers),
+its sliding variable: new symbols s stand for sigma in all that it computes, and the loop has, with the equivalent gain
+N of the command by s at some amplitude (its describing function, which is a matter of numbers),
 
     du = (du/dx at fixed s) dx + N (dsigma/dx) dx,   likewise for the states z and their rates
 
@@ -30,7 +30,7 @@ class Linearisation:
     plant      (w, x, u, p) -> dx and its derivatives by x, u
     control    (w, x, z, s, h, p) -> u, dz, ahead, and of each the derivatives by x, z; sigma and its likewise
     by_sigma   (w, x, z, s, h, p) -> u, dz, ahead: what an equivalent gain is computed from
-    law        (w, x, z, s, h, p) -> what the reaching law asks for before a_max, as the loop judges it; zero without one
+    law        (w, x, z, s, h, p) -> what the reaching law asks for before a_max, but for its sign; zero without one
     euler      whether z goes on by an explicit Euler step where the control is sampled
     cut        whether there is a sliding variable, and so an s; it has no entries otherwise
     """
@@ -59,7 +59,7 @@ class Linearisation:
         s = ca.SX.sym("s", system.n if self.cut else 0)
         results = [signals.command, signals.dz, signals.ahead, signals.a_law]
         if self.cut:
-            *results, sigma = replaced_values([*results, signals.sigma], signals.sigma, s)
+            *results, _ = replaced_values([*results, signals.sigma], signals.sigma, s)
             owner = f"controller {system.controller.name}"
             if not ca.depends_on(signals.sigma, system.x):
                 raise ValueError(f"{owner}: sigma does not depend on the state: no gain of it can be told")

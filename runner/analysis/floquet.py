@@ -1,4 +1,4 @@
-"""The largest Floquet exponent of the continuous loop, where its reference and what disturbs it have a common period."""
+"""The largest Floquet exponent of the continuous loop, where all that drives it has a common period."""
 
 from __future__ import annotations
 

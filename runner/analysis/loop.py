@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as ca
@@ -165,7 +165,8 @@ def linear_loop(
 
 def _law_gain(scenario: Scenario, values: Floats, x: Floats, reach: Floats) -> Floats:
     """H^-1 N with the H that the controller believes in, less than zero where the law opposes sigma."""
-    return -np.linalg.solve(_believed_mass(scenario, values, x), reach)
+    gain: Floats = -np.linalg.solve(_believed_mass(scenario, values, x), reach)
+    return gain
 
 
 def _believed_mass(scenario: Scenario, values: Floats, x: Floats) -> Floats:
@@ -253,7 +254,7 @@ def _operating_points(scenario: Scenario, values: Floats, times: Floats) -> tupl
         return dict(zip(("dx", "A", "B"), (item.reshape(runs, count, *item.shape[1:]) for item in found), strict=True))
 
     # Springs and motors enter linearly: one step of Newton's method finds what carries the joints, a second rounds off.
-    rates = [k for k in range(n, 2 * n)] + [k for k in range(3 * n, 4 * n) if elastic]
+    rates = list(range(n, 2 * n)) + [k for k in range(3 * n, 4 * n) if elastic]
     springs = list(range(2 * n, 3 * n)) if elastic else []
     wanted = np.concatenate([ddq, ddq] if elastic else [ddq], axis=-1)
     found = plant()

@@ -1,4 +1,4 @@
-"""The loop linearised: against the paper's spectra (PAPER.md E3, E13), benchmarks solved by hand, and simulated runs."""
+"""The loop linearised: against the paper's spectra (E3, E13), benchmarks solved by hand, and simulated runs."""
 
 from __future__ import annotations
 
@@ -326,7 +326,7 @@ def test_a_lag_is_a_state_and_costs_delay() -> None:
 
 
 def test_the_radius_of_a_double_integrator_that_is_sampled() -> None:
-    """A rigid link, k_p e + k_d de held for T, by hand: x' = [[1 - k_p T^2/2, T - k_d T^2/2], [-k_p T, 1 - k_d T]] x."""
+    """A rigid link, k_p e + k_d de held for T, by hand: [[1 - k_p T^2/2, T - k_d T^2/2], [-k_p T, 1 - k_d T]]."""
     changes = ONE_LINK | {"drive.kind": "rigid", "mechanism.g": 0.0, "control.controller": "computed_torque"}
     kp, kd, period = 200.0, 30.0, 0.01
     gains = {"control.computed_torque.k_p": kp, "control.computed_torque.k_d": kd}
@@ -378,7 +378,7 @@ def test_margins_are_those_of_python_control() -> None:
     loop = linear_loop(load_scenario("paper/nominal", ONE_LINK | still_link()), times=[0.0])
     (found,) = margins(loop)
     system = control.ss(loop.A[0, 0], loop.B[0, 0], -loop.Cx[0, 0], 0.0)
-    gain, phase, _, gain_at, phase_at, _ = control.stability_margins(system)
+    gain, phase, *_ = control.stability_margins(system)
     assert found.gain[0] == pytest.approx(gain, rel=1e-4)
     assert found.phase[0] == pytest.approx(math.radians(phase), rel=1e-4)
 
@@ -444,7 +444,8 @@ def envelope(values: np.ndarray, t: np.ndarray) -> float:
 @pytest.mark.parametrize(("period", "delay"), [(2.2e-3, 0.0), (1e-3, 7e-4)])
 def test_a_long_run_grows_as_the_spectral_radius_says(period: float, delay: float) -> None:
     start = {  # without weight, for there is no command to carry it until the first one arrives
-        "initial.q": [1e-9, 1.0], "mechanism.g": 0.0, "initial.q_motor": "equilibrium", "control.controller": "computed_torque",
+        "initial.q": [1e-9, 1.0], "mechanism.g": 0.0, "initial.q_motor": "equilibrium",
+        "control.controller": "computed_torque",
         "simulation.duration": 0.44, "simulation.output_every": 1, "simulation.step": 1e-4,
     }  # fmt: skip
     scenario = load_scenario("paper/nominal", still() | start | sampled(period, delay=delay))
