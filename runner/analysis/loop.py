@@ -165,7 +165,7 @@ def linear_loop(
 
 def _law_gain(scenario: Scenario, values: Floats, x: Floats, reach: Floats) -> Floats:
     """H^-1 N with the H that the controller believes in, less than zero where the law opposes sigma."""
-    gain: Floats = -np.linalg.solve(_believed_mass(scenario, values, x), reach)
+    gain: Floats = np.linalg.solve(_believed_mass(scenario, values, x), -reach).astype(np.float64)
     return gain
 
 
