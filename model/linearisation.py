@@ -1,8 +1,8 @@
 """The loop linearised, symbolically: plant and control by automatic differentiation, a law by what stands before it.
 
 Differentiated where the error is zero, a law of sigma is not seen at all, or has no bound. So the controller is cut at
-its sliding variable: new symbols s stand for sigma in all that it computes, and the loop has, with the equivalent gain N
-of the command by s at some amplitude (its describing function, which is a matter of numbers),
+its sliding variable: new symbols s stand for sigma in all that it computes, and the loop has, with the equivalent gain
+N of the command by s at some amplitude (its describing function, which is a matter of numbers),
 
     du = (du/dx at fixed s) dx + N (dsigma/dx) dx,   likewise for the states z and their rates
 
@@ -30,7 +30,7 @@ class Linearisation:
     plant      (w, x, u, p) -> dx and its derivatives by x, u
     control    (w, x, z, s, h, p) -> u, dz, ahead, and of each the derivatives by x, z; sigma and its likewise
     by_sigma   (w, x, z, s, h, p) -> u, dz, ahead: what an equivalent gain is computed from
-    law        (w, x, z, s, h, p) -> what the reaching law asks for before a_max, as the loop judges it; zero without one
+    law        (w, x, z, s, h, p) -> what the reaching law asks for before a_max, but for its sign; zero without one
     euler      whether z goes on by an explicit Euler step where the control is sampled
     cut        whether there is a sliding variable, and so an s; it has no entries otherwise
     """
@@ -43,7 +43,9 @@ class Linearisation:
     def plant(self) -> ca.Function:
         """dx (nx x 1), by x (nx x nx), by u (nx x n)."""
         system = self.system
-        x, u, p = (ca.SX.sym(name, symbol.numel()) for name, symbol in (("x", system.x), ("u", system.u), ("p", system.p)))
+        x, u, p = (
+            ca.SX.sym(name, symbol.numel()) for name, symbol in (("x", system.x), ("u", system.u), ("p", system.p))
+        )
         w = ca.SX.sym("w", system.w.numel())
         dx = system.function("loop_plant")(w, x, u, p)
         results = [dx, ca.jacobian(dx, x), ca.jacobian(dx, u)]
@@ -57,7 +59,7 @@ class Linearisation:
         s = ca.SX.sym("s", system.n if self.cut else 0)
         results = [signals.command, signals.dz, signals.ahead, signals.a_law]
         if self.cut:
-            *results, sigma = replaced_values([*results, signals.sigma], signals.sigma, s)
+            *results, _ = replaced_values([*results, signals.sigma], signals.sigma, s)
             owner = f"controller {system.controller.name}"
             if not ca.depends_on(signals.sigma, system.x):
                 raise ValueError(f"{owner}: sigma does not depend on the state: no gain of it can be told")
@@ -81,7 +83,9 @@ class Linearisation:
         """u, dz, ahead, sigma, each followed by its derivatives by x and z."""
         s, results, sigma, _ = self._written
         x, z = self.system.x, self.system.z
-        outputs = [item for value in (*results, sigma) for item in (value, ca.jacobian(value, x), ca.jacobian(value, z))]
+        outputs = [
+            item for value in (*results, sigma) for item in (value, ca.jacobian(value, x), ca.jacobian(value, z))
+        ]
         names = [f"{name}{by}" for name in ("u", "dz", "ahead", "sigma") for by in ("", "_x", "_z")]
         return self._function("linear_control", s, outputs, names)
 

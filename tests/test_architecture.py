@@ -23,8 +23,8 @@ LAYERS = {
     "model": ("model.symbolic", "model.mechanisms", "model.control", "model.structure", "model.system"),
     "codegen": ("codegen.files", "codegen.elementary", "codegen.program", "codegen.kernel.toolchain", "codegen.kernel",
                 "codegen.export", "codegen.export.c", "codegen.export.fmu"),
-    "runner": ("runner.files", "runner.scenario", "runner.report", "runner.run", "runner.sweep", "runner.paper",
-               "runner.cli"),
+    "runner": ("runner.files", "runner.scenario", "runner.report", "runner.run", "runner.sweep",
+               "runner.analysis", "runner.paper", "runner.cli"),
 }  # fmt: skip
 STRANGERS = {
     "model": {"casadi", "numpy", "lazy_loader"},

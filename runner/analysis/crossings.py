@@ -86,7 +86,8 @@ class _Response:
         near = (upper.imag[:, None] + width[:, None] * _AROUND).ravel()
         even = np.geomspace(min(lowest, 0.1 * highest), highest, _EVENLY)
         found = np.unique(np.concatenate([even, near]))
-        return found[(found >= even[0]) & (found < highest * (1 - 1e-9))]
+        inside: Floats = found[(found >= even[0]) & (found < highest * (1 - 1e-9))]
+        return inside
 
 
 def _roots(f: Callable[[float], float], grid: Floats, values: Floats) -> list[float]:
@@ -119,8 +120,8 @@ def _least_delay(response: _Response) -> tuple[float, float]:
 def delay_max(loop: LinearLoop) -> tuple[Boundary, ...]:
     """The largest delay, s, of all motors' commands alike, with which the loop is stable at all times; one a run.
 
-    Of a sampled scenario at its period, the delay that it has included; of a continuous one, of the continuous loop: the
-    smallest delay with a root of its characteristic equation on the imaginary axis.
+    Of a sampled scenario at its period, the delay that it has included; of a continuous one, of the continuous loop:
+    the smallest delay with a root of its characteristic equation on the imaginary axis.
     """
     return tuple(_delay_max(one_run(loop, run)) for run in range(len(loop.values)))
 
@@ -215,6 +216,7 @@ def _boundaries(response: _Response) -> tuple[list[tuple[float, float]], list[tu
         except np.linalg.LinAlgError:  # an integrator: the response has no bound there, and no gain a boundary
             continue
     phases = [
-        (abs(float(np.angle(at(omega)))), omega) for omega in _roots(lambda w: abs(at(w)) - 1.0, grid, np.abs(values) - 1.0)
+        (abs(float(np.angle(at(omega)))), omega)
+        for omega in _roots(lambda w: abs(at(w)) - 1.0, grid, np.abs(values) - 1.0)
     ]
     return [(1 / here, omega) for here, omega in gains if 1 / _FARTHEST < here < _FARTHEST], phases

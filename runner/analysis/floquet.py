@@ -1,4 +1,4 @@
-"""The largest Floquet exponent of the continuous loop, where its reference and what disturbs it have a common period."""
+"""The largest Floquet exponent of the continuous loop, where all that drives it has a common period."""
 
 from __future__ import annotations
 
@@ -40,7 +40,9 @@ def common_period(scenario: Scenario) -> tuple[float | None, float, str]:
     found = {
         value
         for key, value in p.items()
-        if key.split(".")[0] in _SIGNALS and key.endswith(".omega") and p[f"{key.removesuffix('omega')}amplitude"] != 0.0
+        if key.split(".")[0] in _SIGNALS
+        and key.endswith(".omega")
+        and p[f"{key.removesuffix('omega')}amplitude"] != 0.0
     }
     omegas = sorted(abs(value) for value in found if value != 0.0)
     if not omegas:
@@ -48,7 +50,9 @@ def common_period(scenario: Scenario) -> tuple[float | None, float, str]:
     ratios = [Fraction(omega / omegas[0]).limit_denominator(_LARGEST_DENOMINATOR) for omega in omegas]
     for ratio, omega in zip(ratios, omegas, strict=True):
         if abs(float(ratio) * omegas[0] - omega) > _RATIONAL * omega:
-            text = f"{omegas[0]:.6g} and {omega:.6g} rad/s are in no ratio of whole numbers up to {_LARGEST_DENOMINATOR}"
+            text = (
+                f"{omegas[0]:.6g} and {omega:.6g} rad/s are in no ratio of whole numbers up to {_LARGEST_DENOMINATOR}"
+            )
             return None, omegas[-1], f"the terms have no common period: {text}"
     # Of fractions, the greatest common divisor is that of the numerators over the denominators' least common multiple.
     divisor = math.gcd(*(r.numerator for r in ratios)) / math.lcm(*(r.denominator for r in ratios))

@@ -48,9 +48,10 @@ def _modes(loop: LinearLoop) -> tuple[Complex, Complex]:
 def limit_cycle(scenario: Scenario, *, times: ArrayLike | None = None) -> LimitCycle:
     """The limit cycle that the loop as its scenario has it, continuous or sampled, is predicted to end in.
 
-    It is where the loop, unstable for smaller amplitudes of sigma and stable for larger ones, is neither: the first such
-    amplitude between 1e-6 and 10, all joints in the ratio of the critical mode, at the time along the reference where it
-    is largest. Where the loop is stable in the small, only what starts above that reaches it, and the reason says so.
+    It is where the loop, unstable for smaller amplitudes of sigma and stable for larger ones, is neither: the first
+    such amplitude between 1e-6 and 10, all joints in the ratio of the critical mode, at the time along the reference
+    where it is
+    largest. Where the loop is stable in the small, only what starts above that reaches it, and the reason says so.
     """
     if not linearised(scenario).cut:
         return LimitCycle(None, None, None, "the controller has no sliding variable, and so no gain by amplitude")

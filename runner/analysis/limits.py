@@ -60,6 +60,5 @@ def _beyond(loop: LinearLoop, function: ca.Function, most: Floats, sizes: Floats
     w = signal_values(loop.scenario, loop.values, loop.times)
     given = [at_points(w), at_points(loop.x), at_points(loop.z), np.tile(s, count)]
     given += [np.zeros((1, points * count)), np.tile(loop.values.T, points * count)]
-    beyond = (np.abs(over_runs(function, *given)[0][:, :, 0]) > most).any(axis=1)
-    met: NDArray[np.bool_] = beyond.reshape(count, n * 2, len(sizes)).any(axis=1)
-    return met
+    beyond: NDArray[np.bool_] = np.any(np.abs(over_runs(function, *given)[0][:, :, 0]) > most, axis=1)
+    return np.asarray(beyond.reshape(count, n * 2, len(sizes)).any(axis=1), dtype=np.bool_)

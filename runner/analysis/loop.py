@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as ca
@@ -123,9 +123,7 @@ def _padded(rows: Floats, n: int) -> Floats:
 
 def joined(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
     """[[a, b], [c, d]] of stacks of matrices."""
-    result: Floats = np.concatenate(
-        [np.concatenate([a, b], axis=-1), np.concatenate([c, d], axis=-1)], axis=-2
-    )
+    result: Floats = np.concatenate([np.concatenate([a, b], axis=-1), np.concatenate([c, d], axis=-1)], axis=-2)
     return result
 
 
@@ -167,7 +165,8 @@ def linear_loop(
 
 def _law_gain(scenario: Scenario, values: Floats, x: Floats, reach: Floats) -> Floats:
     """H^-1 N with the H that the controller believes in, less than zero where the law opposes sigma."""
-    return -np.linalg.solve(_believed_mass(scenario, values, x), reach)
+    gain: Floats = np.linalg.solve(_believed_mass(scenario, values, x), -reach).astype(np.float64)
+    return gain
 
 
 def _believed_mass(scenario: Scenario, values: Floats, x: Floats) -> Floats:
@@ -240,9 +239,7 @@ def _table_rows(scenario: Scenario, times: Floats) -> Floats:
     return np.concatenate(columns, axis=1)
 
 
-def _operating_points(
-    scenario: Scenario, values: Floats, times: Floats
-) -> tuple[Floats, Floats, dict[str, Floats]]:
+def _operating_points(scenario: Scenario, values: Floats, times: Floats) -> tuple[Floats, Floats, dict[str, Floats]]:
     """x and u that keep the arm on its reference, and the plant's matrices there."""
     n, runs, count = scenario.system().n, len(values), len(times)
     function = linearised(scenario).plant
@@ -257,7 +254,7 @@ def _operating_points(
         return dict(zip(("dx", "A", "B"), (item.reshape(runs, count, *item.shape[1:]) for item in found), strict=True))
 
     # Springs and motors enter linearly: one step of Newton's method finds what carries the joints, a second rounds off.
-    rates = [k for k in range(n, 2 * n)] + [k for k in range(3 * n, 4 * n) if elastic]
+    rates = list(range(n, 2 * n)) + [k for k in range(3 * n, 4 * n) if elastic]
     springs = list(range(2 * n, 3 * n)) if elastic else []
     wanted = np.concatenate([ddq, ddq] if elastic else [ddq], axis=-1)
     found = plant()

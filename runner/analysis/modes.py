@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -197,7 +197,7 @@ def fast_gain(
 
 
 def _owners(loop: LinearLoop) -> NDArray[np.intp]:
-    """Which of the fast modes, the slowest first, is whose: (runs, times, n), by the share of a joint's spring in it."""
+    """Which of the fast modes, the slowest first, is whose, (runs, times, n): by the share of each spring in it."""
     n = loop.n
     values, vectors = np.linalg.eig(_fast(loop, 0.0))
     result = np.empty((*loop.A.shape[:2], n), np.intp)
