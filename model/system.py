@@ -537,6 +537,7 @@ class System:
         declared = differencing_states(self.drive.state) if self.structure.differenced else ()
         return len(entries(declared, self.joints))
 
+    @derived_property
     def stated_control(self) -> ControlSignals:
         """What the controller computes, as it states it: of the state as it is, with nothing put together anew."""
         return self._signals_of_control()

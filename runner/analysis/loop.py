@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from springline.model import Linearisation, Structure, linearisation_of
 from springline.model.symbolic import derivation, over_runs
 from springline.runner.analysis.gain import quadrature
+from springline.runner.files import InputError, Problem
 from springline.runner.scenario import Scenario, kernel_tables
 
 Floats = NDArray[np.float64]
@@ -142,8 +143,11 @@ def linear_loop(
     columns    numbers that are other for each run, by numeric key; one run without
     values     parameter vectors (runs, slots) in place of columns
     Limits U_max, noise, resolution and rate limits are not part of it: they are inactive in the small (`limits_from`).
-    Raises InputError for columns that a scenario refuses, ValueError for a controller that cannot be cut at its sigma.
+    Raises InputError for columns that a scenario refuses and for rates that are made of differences, ValueError for a controller that cannot be cut at its sigma.
     """
+    if scenario.structure().differenced:
+        text = "rates made of differences have no linear loop here: expected 'measured' for an analysis"
+        raise InputError(Problem(scenario.source, "sensor.velocity", text, '"differenced"'))
     if values is None:
         values = scenario.values_for(columns) if columns else scenario.values()[None, :]
     at = np.atleast_1d(np.asarray(np.linspace(0.0, _duration(scenario), _TIMES) if times is None else times, float))

@@ -173,3 +173,9 @@ def test_an_equivalent_gain_by_hand() -> None:
     """The describing function of |s|^(1/2) sgn s is 4/pi times the integral of sin^(3/2) over a quarter of a turn."""
     found = float(equivalent_gain(lambda s: np.sqrt(np.abs(s)) * np.sign(s), 0.01))
     assert found == pytest.approx(1.1128 / np.sqrt(0.01), rel=1e-3)
+
+
+def test_rates_made_of_differences_are_refused() -> None:
+    """To leave them out would call a loop stable that is not."""
+    with pytest.raises(InputError, match=r"sensor.velocity.*no linear loop here"):
+        analysed(**{key.replace(".", "__"): one for key, one in SAMPLED.items()}, sensor__velocity="differenced")
