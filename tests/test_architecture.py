@@ -40,6 +40,7 @@ PAST_THE_DOOR = {
     "codegen/test_sensors.py": {"codegen.export.fmu"},
     "codegen/test_actuators.py": {"codegen.export.fmu"},
     "codegen/test_differenced_rates.py": {"codegen.export.fmu"},
+    "codegen/test_drawn_loops.py": {"codegen.export.fmu"},
     "runner/conftest.py": {"codegen.kernel", "codegen.export.c"},  # saves work that other tests look at
     "runner/cli/test_cli.py": {"runner.paper"},  # makes up what a reproduction returns
     "runner/test_any_arm.py": {"codegen.kernel"},  # has kernels of many joints compiled without optimisation

@@ -143,7 +143,8 @@ def linear_loop(
     columns    numbers that are other for each run, by numeric key; one run without
     values     parameter vectors (runs, slots) in place of columns
     Limits U_max, noise, resolution and rate limits are not part of it: they are inactive in the small (`limits_from`).
-    Raises InputError for columns that a scenario refuses and for rates that are made of differences, ValueError for a controller that cannot be cut at its sigma.
+    Raises InputError for columns that a scenario refuses and for rates that are made of differences, ValueError for a
+    controller that cannot be cut at its sigma.
     """
     if scenario.structure().differenced:
         text = "rates made of differences have no linear loop here: expected 'measured' for an analysis"
