@@ -40,7 +40,7 @@ class Structure:
     feedforward    whether the controller is told how the base moves
     start          whether the joints start where "initial.q" and "initial.dq" say, or on the reference
     effects        properties of sensors and motors, by name, in the order in which they act
-    delay          steps from a command to when it arrives at the motors
+    delay          steps from a command to when it arrives at the motors; in a kernel the most that its runs may have
     differenced    whether the controller is told of positions alone, and makes out the rates by itself
     disturbance    forces on the links, per joint; not even zero where its kind is "none"
     friction       damping and friction that there is, names of drive.FRICTION in their order

@@ -67,18 +67,20 @@ _LAYOUT = (
 class Shape:
     """What there is of everything that a loop takes and gives: all that a compiled one need know of its System.
 
-    columns  of a trajectory;  tables: the signal tables that it reads
+    columns  of a trajectory;  tables: the signal tables that it reads;  delay: most steps that commands take to arrive
     """
 
     joints: int
     states: int
     columns: int
     tables: tuple[TableLayout, ...]
+    delay: int = 0
 
     @classmethod
     def of(cls, system: System) -> Shape:
         """The Shape of a System's loop."""
-        return cls(system.n, system.x.numel() + system.z.numel(), len(system.trajectory), system.tables)
+        states = system.x.numel() + system.z.numel()
+        return cls(system.n, states, len(system.trajectory), system.tables, system.structure.delay)
 
 
 class Kernel:
@@ -152,6 +154,9 @@ class Kernel:
             raise ValueError(
                 f"limits has {len(settings.limits)} pairs, expected one for each of {self.shape.joints} joints"
             )
+        delay = self.shape.delay if settings.delay is None else settings.delay
+        if delay > self.shape.delay:
+            raise ValueError(f"delay is {delay}, expected at most the {self.shape.delay} steps of the structure")
         limits = np.array(settings.limits, dtype=np.float64)
         counted = np.zeros(runs, np.int64) if numbers is None else np.array(numbers, dtype=np.int64)
         if counted.shape != (runs,) or np.any(counted < 0):
@@ -181,6 +186,7 @@ class Kernel:
             bound=settings.bound,
             limits=limits.ctypes.data if limits.size else None,
             hold=settings.hold,
+            delay=delay,
             output_every=settings.output_every,
             response_band=settings.response_band,
             settling_band=settings.settling_band,

@@ -40,6 +40,7 @@ JOB = (
     Member("bound", "double", "a run stops when any |x_i| or |z_i| leaves it"),
     Member("limits", "const double *", "SL_NJ x 2, least and greatest q1 of each joint; NULL: none"),
     Member("hold", "int64_t", "sampled control: steps per sample, >= 1; continuous control ignores it"),
+    Member("delay", "int64_t", "steps from a command to when it arrives, 1 to SL_DELAY where that is not 0"),
     Member("output_every", "int64_t", "a trajectory row every so many steps, and at the end; 0: no trajectory"),
     Member("response_band", "double", "fraction of |e_i(0)|, 0 where response_error counts"),
     Member("settling_band", "double", "fraction of |e_i(0)|, 0 where settling_error counts"),

@@ -20,6 +20,7 @@ class LoopSettings:
 
     limits  least and greatest q1 of each joint, infinite where there is none; () for a loop that looks at none
     seed    of the noise on what sensors show, 32 bits
+    delay   steps from a command to when it arrives, 1 to those of the structure; None for just these
 
     Raises ValueError, with the name and what was expected, for numbers that the loop cannot count or step with.
     """
@@ -36,6 +37,7 @@ class LoopSettings:
     start_time: float = 0.0
     limits: tuple[tuple[float, float], ...] = ()
     seed: int = 0
+    delay: int | None = None
 
     def __post_init__(self) -> None:
         checked = {
@@ -51,6 +53,8 @@ class LoopSettings:
             "seed": whole("seed", self.seed, 0, LARGEST_SEED),
             "start_time": real("start_time", self.start_time),
         }
+        if self.delay is not None:
+            checked["delay"] = whole("delay", self.delay, 1, MOST_STEPS)
         for name, value in checked.items():
             object.__setattr__(self, name, value)  # the numbers that were checked, whatever type they came in
         pairs = [tuple(map(double, pair)) for pair in self.limits]

@@ -12,8 +12,8 @@
  *   the metrics: SL_METRICS_PER_JOINT, sl_sample, sl_metrics, kernel_sample, kernel_metrics_start, _sample and _finish
  *   SL_NMEASURED, SL_NNOISE, where sensors show at samples anything but the state: numbers that they show, and random
  *                numbers that they take
- *   SL_ACTUATED, SL_DELAY, SL_NM, where motors are not driven by the command as it is: steps of delay, numbers that are
- *                remembered; kernel_actuate gives the forces at the nodes of a step
+ *   SL_ACTUATED, SL_DELAY, SL_NM, where motors are not driven by the command as it is: most steps of delay, numbers that
+ *                are remembered; kernel_actuate gives the forces at the nodes of a step
  *   kernel_closed (continuous control) or kernel_control, kernel_error, kernel_plant (sampled control)
  *   the integrator: SL_STAGES, SL_INSTANTS (times a step needs signals at, its end not counted), SL_KEPT (slopes that are
  *                needed for long), sl_node, sl_when, sl_kept, kernel_update
@@ -129,7 +129,7 @@ typedef struct {
 #endif
 #if SL_ACTUATED
   sl_group command[SL_NJ];                  /* of the controller; u is what acts */
-  sl_group line[SL_DELAY + 1][SL_NJ];       /* commands that have not arrived, that of step k at k % SL_DELAY */
+  sl_group line[SL_DELAY + 1][SL_NJ];       /* commands that have not arrived, that of step k at k % delay */
   sl_group m[SL_NM + 1];                    /* what motors remember */
   sl_group acting[SL_INSTANTS + 1][SL_NJ];  /* at the nodes of the step, and at its end */
 #endif
@@ -370,6 +370,9 @@ static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
 static void drive_motors(sl_pack *pack, int64_t k, sl_time now) {
   const sl_group *arrived = (const sl_group *)pack->command;
   sl_group ahead[SL_NM + 1], late[SL_NJ];
+#if SL_DELAY > 0
+  int64_t place;
+#endif
   if (k % pack->job->hold == 0) {
     int fine = 0;
 #if SL_BLOCKED
@@ -383,8 +386,9 @@ static void drive_motors(sl_pack *pack, int64_t k, sl_time now) {
     if (!fine) sample_control(pack, k, now);
   }
 #if SL_DELAY > 0
-  memcpy(late, pack->line[k % SL_DELAY], sizeof late);
-  memcpy(pack->line[k % SL_DELAY], pack->command, sizeof late);
+  place = k % pack->job->delay;
+  memcpy(late, pack->line[place], sizeof late);
+  memcpy(pack->line[place], pack->command, sizeof late);
   arrived = (const sl_group *)late;
 #else
   (void)late;

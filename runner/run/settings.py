@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from springline.codegen.kernel import LoopSettings
+from springline.model.structure import Structure
 from springline.runner.scenario import Scenario
+
+_ROOM = 64  # steps of delay that a kernel has room for at least: all these delays share one
 
 
 def loop_settings(scenario: Scenario, *, trajectory: bool) -> LoopSettings:
@@ -20,4 +25,12 @@ def loop_settings(scenario: Scenario, *, trajectory: bool) -> LoopSettings:
         settling_error=scenario.settling_error,
         limits=scenario.limits,
         seed=scenario.seed,
+        delay=scenario.structure().delay or None,
     )
+
+
+def kernel_structure(scenario: Scenario) -> Structure:
+    """The structure of a scenario's kernel: with room for its delay and others, for how long it is is a number."""
+    structure = scenario.structure()
+    delay = structure.delay and max(_ROOM, 1 << (structure.delay - 1).bit_length())
+    return replace(structure, delay=delay)

@@ -28,7 +28,7 @@ from springline.model.system import System
 from springline.runner.run.columns import metrics_table, trajectory_table
 from springline.runner.run.crew import Crew, results
 from springline.runner.run.limits import refuse_large
-from springline.runner.run.settings import loop_settings
+from springline.runner.run.settings import kernel_structure, loop_settings
 from springline.runner.scenario import Scenario, expect_scenario, kernel_tables
 
 Floats = NDArray[np.float64]
@@ -93,7 +93,7 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     expect_scenario(scenario)
     options = replace(ONE_RUN, engine=engine)
     refuse_large(scenario)
-    loop = kernel(KernelSpec(scenario.structure(), scenario.control_every > 0, options=options))
+    loop = kernel(KernelSpec(kernel_structure(scenario), scenario.control_every > 0, options=options))
     settings = loop_settings(scenario, trajectory=True)
     tables = kernel_tables(scenario.tables())
     values = scenario.values()[None, :]

@@ -20,6 +20,7 @@ from .scenario import per_run as per_run
 from .scenario import weighs as weighs
 from .schema import DOORS as DOORS
 from .schema import DOOR_KEYS as DOOR_KEYS
+from .schema import TIMING_UNITS as TIMING_UNITS
 from .schema import given_text as given_text
 from .schema import names_file as names_file
 from .schema import number_text as number_text

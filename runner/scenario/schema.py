@@ -398,6 +398,9 @@ DOORS: Mapping[tuple[str, str], tuple[Registry[Any], str]] = {
 }
 """Table and key that may name a class of a user's file -> what else it may name, and what it is by default."""
 DOOR_KEYS = tuple(f"{table}.{key}" for table, key in DOORS)
+
+TIMING_UNITS = dict.fromkeys(("control.period", "actuator.delay", "simulation.step", "simulation.duration"), "s")
+"""Of numbers that the loop counts steps by, and that no System knows."""
 """They as dotted keys."""
 
 

@@ -1,4 +1,4 @@
-"""Figures of a dataset: curves over one key, a map over two, rank correlations and a scatter matrix over more; groups
+"""Figures of a dataset: curves over one key, maps over two, rank correlations and a scatter matrix over more; groups
 of a sweep side by side.
 """
 
@@ -10,35 +10,43 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from springline.codegen.kernel import CHATTERING
 from springline.runner.report import LINES, PAGE, house_style, legend_above, panels
 from springline.runner.sweep.influence import correlation, scatter_matrix
-from springline.runner.sweep.map import settling_map
+from springline.runner.sweep.map import metric_map, outcome_map
 from springline.runner.sweep.plan import Plan
-from springline.runner.sweep.shown import MOST_GROUPS, Runs, plain_decades
-from springline.runner.sweep.summary import Summary, group_names
+from springline.runner.sweep.shown import MOST_GROUPS, STOPPED, Runs, plain_decades
+from springline.runner.sweep.summary import Summary, group_names, short
 
+_MOST_COLUMNS = 4
 _RING: Mapping[str, Any] = {"markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.7}
 
 
 def summary_figures(plan: Plan, summary: Summary) -> dict[str, Figure]:
     """The figures of a dataset, by name; what there is to see decides which."""
     axes = plan.numeric_axes()
+    of_groups = group_names(plan)
+    names = list(dict.fromkeys(of_groups))
+    group = np.searchsorted([group.first for group in plan.groups], summary.shown["run"].to_numpy(), side="right") - 1
     runs = Runs(
         summary.shown,
         summary.units,
         plan.joints,
         [axis.key for axis in axes],
         {axis.key: axis.kind == "log_uniform" for axis in axes},
-        np.searchsorted([group.first for group in plan.groups], summary.shown["run"].to_numpy(), side="right") - 1,
-        group_names(plan),
+        np.array([names.index(name) for name in of_groups])[group],
+        names,
         plan.sweep.method == "grid" and len(summary.shown) == summary.runs,
     )
     figures: dict[str, Figure] = {}
     with house_style():
         if len(axes) == 1:
-            figures["curve"] = _curve(runs)
+            figures["curve"] = _curve(runs) if len(names) <= MOST_GROUPS else _columns_of_curves(runs, _split(plan))
         elif len(axes) == 2:
-            figures["map"] = settling_map(runs)
+            figures["map"] = metric_map(runs, "settling_time")
+            figures["error_map"] = metric_map(runs, "steady_state_error")
+            if not runs.ok.all() or runs.chattering.any():
+                figures["outcomes"] = outcome_map(runs)
         elif axes:
             figures["correlation"] = correlation(runs)
             figures["scatter"] = scatter_matrix(runs)
@@ -68,6 +76,58 @@ def _curve(runs: Runs) -> Figure:
         axes.set_xlabel(runs.title(key))
     if len(runs.names) > 1 or runs.chattering.any():
         legend_above(figure)
+    return figure
+
+
+def _split(plan: Plan) -> list[tuple[str, str]]:
+    """Of each name of a group, what its first key is, and the others."""
+    told = dict(zip(group_names(plan), (plan.told_apart(group) for group in plan.groups), strict=True))
+    words = [[f"{key.rpartition('.')[2]} = {short(value)}" for key, value in each.items()] for each in told.values()]
+    return [(first, ", ".join(rest)) for first, *rest in words]
+
+
+def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
+    """Chatter and steady-state error over one key: a column for each value of the first key that groups, lines for others.
+
+    Where a run stopped stands a cross at the top.
+    """
+    columns = list(dict.fromkeys(first for first, _ in split))[:_MOST_COLUMNS]
+    lines = list(dict.fromkeys(rest for _, rest in split))[:MOST_GROUPS]
+    shown = [f"{metric}_{joint.name}" for metric in ("chatter", "steady_state_error") for joint in runs.joints]
+    figure, grid = panels(len(shown), len(columns), width=PAGE, height=1.25)
+    key = runs.keys[0]
+    for row, column in zip(grid, shown, strict=True):
+        row[0].set_ylabel(runs.title(column).replace(" error", "\nerror"))
+        for other in row[1:]:
+            other.sharey(row[0])
+            other.tick_params(labelleft=False)
+        for g, (first, rest) in enumerate(split):
+            if first not in columns or rest not in lines:
+                continue
+            axes = row[columns.index(first)]
+            style = LINES[lines.index(rest)]
+            chosen = runs.group == g
+            ends, stops = chosen & runs.ok, chosen & ~runs.ok
+            order = np.argsort(runs[key][ends])
+            axes.plot(runs[key][ends][order], runs[column][ends][order], label=rest or None, **style)
+            top = axes.get_xaxis_transform()
+            axes.plot(
+                runs[key][stops], np.full(stops.sum(), 0.96), "x", color=style["color"], transform=top, markersize=4
+            )
+        known = runs[column][runs.ok & np.isfinite(runs[column])]
+        if known.size and known.min() > 0 and known.max() > 5 * known.min():
+            row[0].set_yscale("log")
+        if column.startswith("chatter"):
+            for axes in row:
+                axes.axhline(CHATTERING, color="black", linewidth=0.6, label=f"chattering above {CHATTERING:g} 1/s")
+    for axes, first in zip(grid[0], columns, strict=True):
+        axes.set_title(first.partition(" = ")[2])
+    for axes in grid[-1]:
+        axes.set_xscale("log" if runs.logarithmic[key] else "linear")
+        axes.set_xlabel(runs.title(key))
+    if not runs.ok.all():
+        grid[0, 0].plot([], [], "x", color=STOPPED, label="stopped early")
+    legend_above(figure, columns=4)
     return figure
 
 

@@ -1,4 +1,4 @@
-"""The map of a sweep over two keys."""
+"""Maps of a sweep over two keys: of a metric, and of what became of the runs."""
 
 from __future__ import annotations
 
@@ -7,65 +7,160 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import NDArray
 
+from springline.codegen.kernel import CHATTERING
 from springline.runner.report import PAGE, label, legend_above, panels
-from springline.runner.sweep.shown import MOST_GROUPS, STOPPED, Floats, Runs, plain_decades, short
+from springline.runner.sweep.shown import MOST_GROUPS, PLAIN, STOPPED, Floats, Runs, plain_decades, short
 
 _BINS = 40
+_SPAN = 1e3  # of a logarithmic scale at most: one perfect run must not take the colours from all others
+_ROOMY = 2  # rows of maps that leave room for a label below each
 _NEVER = "0.75"
 _HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": "white", "hatch": "//////", "linewidth": 0.0}
 
 
-def settling_map(runs: Runs) -> Figure:
-    """Settling time over two keys, a row a group and a column a joint; where a run stopped, that is shown instead.
+def metric_map(runs: Runs, metric: str) -> Figure:
+    """A metric over two keys, a row a group and a column a joint; where a run stopped, that is shown instead.
 
-    Cells in which most runs that ended well chatter are hatched: their settling time is nothing to choose them by.
+    Cells in which most runs that ended well chatter are hatched: their metric is nothing to choose them by.
     """
     shown = min(len(runs.names), MOST_GROUPS)
-    figure, grid = panels(shown, len(runs.joints), width=PAGE, height=2.5, share_x=False)
-    columns = [f"settling_time_{joint.name}" for joint in runs.joints]
-    x_key, y_key = runs.keys
+    height = 2.5 if shown <= _ROOMY else 1.85
+    figure, grid = panels(shown, len(runs.joints), width=PAGE, height=height, share_x=False)
+    columns = [f"{metric}_{joint.name}" for joint in runs.joints]
     edges = [_edges(runs, key) for key in runs.keys]
-    finite = np.concatenate([runs[column][runs.ok] for column in columns])
-    finite = finite[np.isfinite(finite)]
-    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.1, 1.0)
-    norm = LogNorm(low, max(high, low * 1.01)) if low > 0 else Normalize(low, high)
-    mesh = None
+    one_scale = len({runs.units[column] for column in columns}) == 1
+    scales = [_norm(runs, columns if one_scale else [column]) for column in columns]
+    meshes: list[Any] = [None] * len(columns)
     for g in range(shown):
-        for axes, column, joint in zip(grid[g], columns, runs.joints, strict=True):
-            chosen = (runs.group == g) & np.isfinite([runs[key] for key in runs.keys]).all(axis=0)
-            where = [_cells(runs[key][chosen], e) for key, e in zip(runs.keys, edges, strict=True)]
-            stopped = _binned(where, (~runs.ok[chosen]).astype(float), edges)
-            settled = _binned(where, np.where(runs.ok[chosen], runs[column][chosen], np.nan), edges)
+        for j, (axes, column, joint) in enumerate(zip(grid[g], columns, runs.joints, strict=True)):
+            chosen = _of_group(runs, g)
+            where = _places(runs, chosen, edges)
+            ended = _binned(where, (~runs.ok[chosen]).astype(float), edges)
+            known = _binned(where, np.where(runs.ok[chosen], runs[column][chosen], np.nan), edges)
             ok = _binned(where, runs.ok[chosen].astype(float), edges)
             _shade(axes, edges, np.where(ok > 0, 1.0, np.nan), _NEVER)
-            mesh = axes.pcolormesh(*edges, settled.T, norm=norm, cmap="viridis", rasterized=True)
-            _shade(axes, edges, np.where(stopped > 0.5, 1.0, np.nan), STOPPED)
+            meshes[j] = axes.pcolormesh(*edges, known.T, norm=scales[j], cmap="viridis", rasterized=True)
+            _shade(axes, edges, np.where(ended > 0.5, 1.0, np.nan), STOPPED)
             chatters = _binned(where, np.where(runs.ok[chosen], runs.chattering[chosen], np.nan), edges)
-            _hatch(axes, edges, (chatters > 0.5) & ~(stopped > 0.5))
-            axes.grid(visible=False)
-            axes.set_xscale("log" if runs.logarithmic[x_key] else "linear")
-            axes.set_yscale("log" if runs.logarithmic[y_key] else "linear")
+            _hatch(axes, edges, (chatters > 0.5) & ~(ended > 0.5))
+            _scale_axes(runs, axes)
             axes.set_title(joint.name if len(runs.names) == 1 else f"{joint.name}, {runs.names[g]}", fontsize=8)
-            axes.set_xlabel(runs.title(x_key))
-        grid[g, 0].set_ylabel(runs.title(y_key))
-    if finite.size and mesh is not None:
-        bar = figure.colorbar(
-            mesh, ax=grid.ravel().tolist(), label=label(short("settling_time"), runs.units[columns[0]]), shrink=0.8
-        )
-        if low > 0:
-            plain_decades(bar.ax.yaxis)
-    for name, color in (("never settled", _NEVER), ("stopped early", STOPPED)):
+            if g == shown - 1 or shown <= _ROOMY:
+                axes.set_xlabel(runs.title(runs.keys[0]))
+        grid[g, 0].set_ylabel(runs.title(runs.keys[1]))
+    for j, column in enumerate(columns[:1] if one_scale else columns):
+        if np.any(np.isfinite(runs[column][runs.ok])):
+            beside = grid if one_scale else grid[:, j]
+            title = short(metric if one_scale else column)
+            bar = figure.colorbar(
+                meshes[j],
+                ax=beside.ravel().tolist(),
+                label=label(title, runs.units[column]),
+                extend="min" if np.nanmin(runs[column][runs.ok]) < scales[j].vmin else "neither",
+                **({"shrink": 0.8} if one_scale else {"location": "bottom", "shrink": 0.9}),
+            )
+            if isinstance(scales[j], LogNorm):
+                plain_decades(bar.ax.yaxis if one_scale else bar.ax.xaxis)
+    never = [("never settled", _NEVER)] if metric == "settling_time" else []
+    stopped = [("stopped early", STOPPED)] if not runs.ok.all() else []
+    for name, color in (*never, *stopped):
         grid[0, 0].plot([], [], "s", color=color, label=name)
     if runs.chattering.any():
         style = {**_HATCH, "facecolor": "0.3"}
         grid[0, 0].add_patch(Rectangle((np.nan, np.nan), 1, 1, label="chattering", **style))
     legend_above(figure)
     return figure
+
+
+def outcome_map(runs: Runs) -> Figure:
+    """What becomes of runs over two keys, a panel a group: how much they chatter, and where they stop.
+
+    Lines go around the cells in which most runs stopped, and around those in which most chatter or stopped.
+    """
+    shown = min(len(runs.names), MOST_GROUPS)
+    width = min(shown, 2)
+    figure, grid = panels(-(-shown // width), width, width=PAGE, height=2.5, share_x=False)
+    edges = [_edges(runs, key) for key in runs.keys]
+    worst = np.max([runs[f"chatter_{joint.name}"] for joint in runs.joints], axis=0)
+    norm = LogNorm(1.0, 1000.0)
+    mesh = None
+    for g, axes in enumerate(grid.flat):
+        if g >= shown:
+            axes.set_visible(False)
+            continue
+        chosen = _of_group(runs, g)
+        where = _places(runs, chosen, edges)
+        stopped = _binned(where, (~runs.ok[chosen]).astype(float), edges) > 0.5
+        uneasy = _binned(where, (~runs.ok[chosen] | runs.chattering[chosen]).astype(float), edges) > 0.5
+        chatter = _binned(where, np.where(runs.ok[chosen], np.maximum(worst[chosen], 1.0), np.nan), edges)
+        mesh = axes.pcolormesh(*edges, chatter.T, norm=norm, cmap="cividis_r", rasterized=True)
+        _shade(axes, edges, np.where(stopped, 1.0, np.nan), STOPPED)
+        _boundary(axes, edges, uneasy, "chatters beyond", "black", "white", linewidth=2.2)
+        _boundary(axes, edges, stopped, "stops beyond", "white", "black", linewidth=1.0, linestyle=(0, (3, 2)))
+        _scale_axes(runs, axes)
+        axes.set_title("" if len(runs.names) == 1 else runs.names[g], fontsize=8)
+        if g + width >= shown:
+            axes.set_xlabel(runs.title(runs.keys[0]))
+        if g % width == 0:
+            axes.set_ylabel(runs.title(runs.keys[1]))
+    assert mesh is not None
+    bar = figure.colorbar(
+        mesh, ax=grid.ravel().tolist(), label=f"chatter [1/s]; chattering above {CHATTERING:g}", shrink=0.8
+    )
+    plain_decades(bar.ax.yaxis)
+    bar.ax.axhline(CHATTERING, color="black", linewidth=1.6)
+    grid[0, 0].plot([], [], "s", color=STOPPED, label="stopped early")
+    legend_above(figure, columns=4)
+    return figure
+
+
+def _norm(runs: Runs, columns: Sequence[str]) -> Normalize:
+    """From the least to the largest number of the runs that ended well, logarithmic where none is zero."""
+    known = np.concatenate([runs[column][runs.ok] for column in columns])
+    known = known[np.isfinite(known)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.1, 1.0)
+    if low <= 0:
+        return Normalize(low, high)
+    return LogNorm(max(low, high / _SPAN), max(high, low * 1.01))
+
+
+def _scale_axes(runs: Runs, axes: Axes) -> None:
+    axes.grid(visible=False)
+    for key, axis, scale in zip(runs.keys, (axes.xaxis, axes.yaxis), (axes.set_xscale, axes.set_yscale), strict=True):
+        scale("log" if runs.logarithmic[key] else "linear")
+        if not runs.logarithmic[key]:
+            axis.set_major_formatter(PLAIN)
+
+
+def _of_group(runs: Runs, g: int) -> NDArray[np.bool_]:
+    """The runs of a group that have both keys: a table of a controller that a group lacks has none."""
+    chosen: NDArray[np.bool_] = (runs.group == g) & np.isfinite([runs[key] for key in runs.keys]).all(axis=0)
+    return chosen
+
+
+def _places(runs: Runs, chosen: NDArray[np.bool_], edges: Sequence[Floats]) -> list[NDArray[np.int64]]:
+    """In which cell of each key the chosen runs lie."""
+    return [_cells(runs[key][chosen], e) for key, e in zip(runs.keys, edges, strict=True)]
+
+
+def _boundary(
+    axes: Axes, edges: Sequence[Floats], inside: NDArray[np.bool_], name: str, color: str, rim: str, **style: Any
+) -> None:
+    """Draw the line between the cells that are inside and those that are not."""
+    x, y = edges
+    upright = [[(x[i + 1], y[j]), (x[i + 1], y[j + 1])] for i, j in np.argwhere(inside[1:] != inside[:-1])]
+    level = [[(x[i], y[j + 1]), (x[i + 1], y[j + 1])] for i, j in np.argwhere(inside[:, 1:] != inside[:, :-1])]
+    if upright or level:
+        halo = [Stroke(linewidth=style["linewidth"] + 1.2, foreground=rim), Normal()]
+        axes.add_collection(LineCollection(upright + level, colors=color, path_effects=halo, **style))
+        axes.plot([], [], color=color, label=name, path_effects=halo, **style)
 
 
 def _edges(runs: Runs, key: str) -> Floats:

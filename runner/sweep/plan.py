@@ -25,6 +25,7 @@ from springline.runner.run import field, metrics_schema, metrics_table, trajecto
 from springline.runner.scenario import (
     CHOOSERS,
     DOOR_KEYS,
+    TIMING_UNITS,
     NumericKey,
     Record,
     Scenario,
@@ -43,12 +44,13 @@ from springline.runner.scenario import FOLDER as TABLES
 from springline.runner.sweep import sampling
 from springline.runner.sweep.axis_checks import AxisChecks
 from springline.runner.sweep.drawing import Columns, Drawing, grid_values
-from springline.runner.sweep.sweep import Axis, Sweep
+from springline.runner.sweep.sweep import Axis, Sweep, is_number
 from springline.runner.sweep.work import Outcome, Work, work_for
 
 Floats = NDArray[np.float64]
 
-MOST_GROUPS = 256
+MOST_GROUPS = 512
+_MOST_PANELS = 3
 MOST_PARTS = 1_000_000
 """As many as the six digits of their names tell apart; a folder of more is slow everywhere."""
 
@@ -288,16 +290,30 @@ class Plan:
     @cached_property
     def key_fields(self) -> list[pa.Field]:
         """The columns of the sweep's keys, with their units."""
+        units = TIMING_UNITS | {key: number.unit for key, number in self.sweep.scenario.numeric_keys().items()}
         return [
             field(axis.key, self._numeric[axis.key].unit)
             if axis.key in self._numeric
-            else field(axis.key, "", self._structural_type(axis))
+            else field(axis.key, units.get(axis.key, ""), self._structural_type(axis))
             for axis in self.sweep.axes
         ]
 
     def numeric_axes(self) -> list[Axis]:
-        """The axes along which numbers vary by themselves inside a group, in the order of the sweep."""
-        return [axis for axis in self._inner if len(axis.values) != 1]
+        """The axes along which numbers vary by themselves, in the order of the sweep.
+
+        Those inside a group, and those of many groups, such as a dozen delays: fewer are told apart by name.
+        """
+        return [axis for axis in self._free if (axis in self._inner and len(axis.values) != 1) or self._counts(axis)]
+
+    def told_apart(self, group: Group) -> dict[str, Any]:
+        """The constants of a group by which people tell it from others; groups along a numeric axis have the same, and None tells nothing."""
+        told = [axis.key for axis in self._outer if not self._counts(axis)]
+        return {key: value for key, value in group.constants.items() if key in told and value is not None}
+
+    def _counts(self, axis: Axis) -> bool:
+        """Whether the groups of an outer axis are points along it."""
+        numbers = all(is_number(value) for value in axis.values)
+        return axis in self._outer and axis.kind == "values" and numbers and len(axis.values) > _MOST_PANELS
 
     # Description
 

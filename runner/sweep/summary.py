@@ -164,15 +164,10 @@ def _picked(chunk: Chunk, runs: int) -> NDArray[np.bool_]:
 
 
 def group_names(plan: Plan) -> list[str]:
-    """What tells the groups of a sweep apart: "control.fast = false", "all" if there is one only."""
-    if len(plan.groups) == 1:
-        return ["all"]
-    tied = {axis.key for axis in plan.sweep.axes if axis.kind == "tie"}
-    constants = ({key: value for key, value in group.constants.items() if key not in tied} for group in plan.groups)
-    return [
-        ", ".join(f"{key.rpartition('.')[2]} = {short(value)}" for key, value in c.items() if value is not None)
-        for c in constants
-    ]
+    """What tells the groups of a sweep apart: "fast = false", "all" if nothing does."""
+    told = [plan.told_apart(group).items() for group in plan.groups]
+    names = [", ".join(f"{key.rpartition('.')[2]} = {short(value)}" for key, value in items) for items in told]
+    return names if len(set(names)) > 1 else ["all"] * len(names)
 
 
 def short(value: object) -> str:

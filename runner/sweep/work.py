@@ -28,7 +28,7 @@ from springline.codegen.kernel import (
 )
 from springline.codegen.program import SignalTable, program
 from springline.model.system import System
-from springline.runner.run import loop_settings
+from springline.runner.run import kernel_structure, loop_settings
 from springline.runner.scenario import Scenario, Slots, kernel_tables, per_run
 
 Floats = NDArray[np.float64]
@@ -97,7 +97,7 @@ def _runtime_tokens() -> dict[str, list[str]]:
 def work_for(scenario: Scenario, slots: Slots) -> Work:
     """The Work of a scenario's runs: a slot in which they differ is tunable, any other is baked."""
     spec = KernelSpec(
-        scenario.structure(),
+        kernel_structure(scenario),
         scenario.control_every > 0,
         tuple(key for key, values in slots.items() if np.any(values != np.ravel(values)[0])),
         tuple(float(np.ravel(values)[0]) for values in slots.values()),
