@@ -87,7 +87,7 @@ def _split(plan: Plan) -> list[tuple[str, str]]:
 
 
 def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
-    """Chatter and steady-state error over one key: a column for each value of the first key that groups, lines for others.
+    """Chatter and steady-state error over one key: a column for each value of the first that groups, lines for others.
 
     Where a run stopped stands a cross at the top.
     """

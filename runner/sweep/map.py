@@ -37,6 +37,9 @@ def metric_map(runs: Runs, metric: str) -> Figure:
     edges = [_edges(runs, key) for key in runs.keys]
     one_scale = len({runs.units[column] for column in columns}) == 1
     scales = [_norm(runs, columns if one_scale else [column]) for column in columns]
+    below = [
+        bool(np.any(runs[c][runs.ok] < float(scale.vmin or 0.0))) for c, scale in zip(columns, scales, strict=True)
+    ]
     meshes: list[Any] = [None] * len(columns)
     for g in range(shown):
         for j, (axes, column, joint) in enumerate(zip(grid[g], columns, runs.joints, strict=True)):
@@ -63,7 +66,7 @@ def metric_map(runs: Runs, metric: str) -> Figure:
                 meshes[j],
                 ax=beside.ravel().tolist(),
                 label=label(title, runs.units[column]),
-                extend="min" if np.nanmin(runs[column][runs.ok]) < scales[j].vmin else "neither",
+                extend="min" if any(below) else "neither",
                 **({"shrink": 0.8} if one_scale else {"location": "bottom", "shrink": 0.9}),
             )
             if isinstance(scales[j], LogNorm):

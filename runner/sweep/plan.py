@@ -303,14 +303,17 @@ class Plan:
 
         Those inside a group, and those of many groups, such as a dozen delays: fewer are told apart by name.
         """
-        return [axis for axis in self._free if (axis in self._inner and len(axis.values) != 1) or self._counts(axis)]
+        return [axis for axis in self._free if (axis in self._inner and len(axis.values) != 1) or self._runs_along(axis)]
 
     def told_apart(self, group: Group) -> dict[str, Any]:
-        """The constants of a group by which people tell it from others; groups along a numeric axis have the same, and None tells nothing."""
-        told = [axis.key for axis in self._outer if not self._counts(axis)]
+        """The constants of a group by which people tell it from others, without those that are None.
+
+        Groups along a numeric axis have the same.
+        """
+        told = [axis.key for axis in self._outer if not self._runs_along(axis)]
         return {key: value for key, value in group.constants.items() if key in told and value is not None}
 
-    def _counts(self, axis: Axis) -> bool:
+    def _runs_along(self, axis: Axis) -> bool:
         """Whether the groups of an outer axis are points along it."""
         numbers = all(is_number(value) for value in axis.values)
         return axis in self._outer and axis.kind == "values" and numbers and len(axis.values) > _MOST_PANELS
