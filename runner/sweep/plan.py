@@ -303,7 +303,8 @@ class Plan:
 
         Those inside a group, and those of many groups, such as a dozen delays: fewer are told apart by name.
         """
-        return [axis for axis in self._free if (axis in self._inner and len(axis.values) != 1) or self._runs_along(axis)]
+        inner = [axis for axis in self._inner if len(axis.values) != 1]
+        return [axis for axis in self._free if axis in inner or self._runs_along(axis)]
 
     def told_apart(self, group: Group) -> dict[str, Any]:
         """The constants of a group by which people tell it from others, without those that are None.
