@@ -100,7 +100,7 @@ def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
         row[0].set_ylabel(runs.title(column).replace(" error", "\nerror"))
         for other in row[1:]:
             other.sharey(row[0])
-            other.tick_params(labelleft=False)
+            other.tick_params(labelleft=False, which="both")
         for g, (first, rest) in enumerate(split):
             if first not in columns or rest not in lines:
                 continue
@@ -117,14 +117,15 @@ def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
         known = runs[column][runs.ok & np.isfinite(runs[column])]
         if known.size and known.min() > 0 and known.max() > 5 * known.min():
             row[0].set_yscale("log")
+            plain_decades(row[0].yaxis)
         if column.startswith("chatter"):
             for axes in row:
                 axes.axhline(CHATTERING, color="black", linewidth=0.6, label=f"chattering above {CHATTERING:g} 1/s")
     for axes, first in zip(grid[0], columns, strict=True):
-        axes.set_title(first.partition(" = ")[2])
+        axes.set_title(first.partition(" = ")[2], fontsize=8)
     for axes in grid[-1]:
         axes.set_xscale("log" if runs.logarithmic[key] else "linear")
-        axes.set_xlabel(runs.title(key))
+    figure.supxlabel(runs.title(key), fontsize=9)
     if not runs.ok.all():
         grid[0, 0].plot([], [], "x", color=STOPPED, label="stopped early")
     legend_above(figure, columns=4)
