@@ -178,7 +178,7 @@ class _Reader:
                 for axis in axes
                 if axis.key in CHOOSERS
                 for value in axis.values
-            }
+            } - {""}  # of a law or an observer without a table of its own
             held: dict[str, object] = {
                 name: value for _, change, _ in changes for name, value in change.items() if table_in(name) in offered
             }

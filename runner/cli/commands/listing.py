@@ -42,7 +42,7 @@ def list_(
     no_code: NoCode = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
-    """List mechanisms, controllers and observers, laws, scenarios and the like.
+    """List mechanisms, controllers, laws, scenarios and the like.
 
     With a scenario, the parameters of its own arm, drive and controller, and their values.
     """
