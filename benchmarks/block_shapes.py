@@ -3,9 +3,9 @@
     python -m benchmarks.block_shapes [--kind NAME]
 
 The benchmark's arm, or one of the kernels that `python -m benchmarks.every_kind --list` names with every parameter
-tunable, with continuous and with sampled control, a batch and a run by itself, in every span, with one and two groups
-of vectors and packs. All kernels are called in this one process, in turn; the best of many short samples
-counts, and the median of the ratios to the choice that were taken in one round.
+tunable, with continuous and with sampled control: a batch in every span, with one and two groups of vectors and packs,
+and a run by itself in every span, with joints in lanes and without. All kernels are called in this one process, in
+turn; the best of many short samples counts, and the median of the ratios to the choice that were taken in one round.
 """
 
 from __future__ import annotations
@@ -45,7 +45,6 @@ def candidates(kind: str, mode: problem.Control, one_run: bool) -> list[Candidat
     """The choice first, then every other."""
     batch = 1 if one_run else ours.BATCH
     chosen = ONE_RUN if one_run else KernelOptions()
-    groups = (1,) if one_run else (1, 2)
 
     def build(options: KernelOptions) -> problem.Runner:
         if not kind:
@@ -54,7 +53,12 @@ def candidates(kind: str, mode: problem.Control, one_run: bool) -> list[Candidat
         return lambda deltas, steps: work.run(steps, len(deltas)).final_state
 
     found = [Candidate("the choice", build(chosen), batch)]
-    for span, group, pack in itertools.product(get_args(Span), groups, groups):
+    if one_run:
+        for span, paired in itertools.product(get_args(Span), (True, False)):
+            options = replace(chosen, span=span, paired=paired)
+            found.append(Candidate(f"{span}, {'joints in lanes' if paired else 'lanes alike'}", build(options), batch))
+        return found
+    for span, group, pack in itertools.product(get_args(Span), (1, 2), (1, 2)):
         options = replace(chosen, span=span, groups=group, packs=pack)
         found.append(Candidate(f"{span}, {group} x {pack}", build(options), batch))
     return found
