@@ -87,7 +87,7 @@ def _split(plan: Plan) -> list[tuple[str, str]]:
 
 
 def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
-    """Chatter and steady-state error over one key: a column for each value of the first key that groups, lines for others.
+    """Chatter and steady-state error over one key: a column for each value of the first that groups, lines for others.
 
     Where a run stopped stands a cross at the top.
     """
@@ -111,7 +111,9 @@ def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
             order = np.argsort(runs[key][ends])
             axes.plot(runs[key][ends][order], runs[column][ends][order], label=rest or None, **style)
             top = axes.get_xaxis_transform()
-            axes.plot(runs[key][stops], np.full(stops.sum(), 0.96), "x", color=style["color"], transform=top, markersize=4)
+            axes.plot(
+                runs[key][stops], np.full(stops.sum(), 0.96), "x", color=style["color"], transform=top, markersize=4
+            )
         known = runs[column][runs.ok & np.isfinite(runs[column])]
         if known.size and known.min() > 0 and known.max() > 5 * known.min():
             row[0].set_yscale("log")

@@ -37,6 +37,9 @@ def metric_map(runs: Runs, metric: str) -> Figure:
     edges = [_edges(runs, key) for key in runs.keys]
     one_scale = len({runs.units[column] for column in columns}) == 1
     scales = [_norm(runs, columns if one_scale else [column]) for column in columns]
+    below = [
+        bool(np.any(runs[c][runs.ok] < float(scale.vmin or 0.0))) for c, scale in zip(columns, scales, strict=True)
+    ]
     meshes: list[Any] = [None] * len(columns)
     for g in range(shown):
         for j, (axes, column, joint) in enumerate(zip(grid[g], columns, runs.joints, strict=True)):
@@ -63,7 +66,7 @@ def metric_map(runs: Runs, metric: str) -> Figure:
                 meshes[j],
                 ax=beside.ravel().tolist(),
                 label=label(title, runs.units[column]),
-                extend="min" if np.nanmin(runs[column][runs.ok]) < scales[j].vmin else "neither",
+                extend="min" if any(below) else "neither",
                 **({"shrink": 0.8} if one_scale else {"location": "bottom", "shrink": 0.9}),
             )
             if isinstance(scales[j], LogNorm):
@@ -111,7 +114,9 @@ def outcome_map(runs: Runs) -> Figure:
         if g % width == 0:
             axes.set_ylabel(runs.title(runs.keys[1]))
     assert mesh is not None
-    bar = figure.colorbar(mesh, ax=grid.ravel().tolist(), label=f"chatter [1/s]; chattering above {CHATTERING:g}", shrink=0.8)
+    bar = figure.colorbar(
+        mesh, ax=grid.ravel().tolist(), label=f"chatter [1/s]; chattering above {CHATTERING:g}", shrink=0.8
+    )
     plain_decades(bar.ax.yaxis)
     bar.ax.axhline(CHATTERING, color="black", linewidth=1.6)
     grid[0, 0].plot([], [], "s", color=STOPPED, label="stopped early")
@@ -142,7 +147,9 @@ def _places(runs: Runs, chosen: NDArray[np.bool_], edges: Sequence[Floats]) -> l
     return [_cells(runs[key][chosen], e) for key, e in zip(runs.keys, edges, strict=True)]
 
 
-def _boundary(axes: Axes, edges: Sequence[Floats], inside: NDArray[np.bool_], name: str, color: str, rim: str, **style: Any) -> None:
+def _boundary(
+    axes: Axes, edges: Sequence[Floats], inside: NDArray[np.bool_], name: str, color: str, rim: str, **style: Any
+) -> None:
     """Draw the line between the cells that are inside and those that are not."""
     x, y = edges
     upright = [[(x[i + 1], y[j]), (x[i + 1], y[j + 1])] for i, j in np.argwhere(inside[1:] != inside[:-1])]

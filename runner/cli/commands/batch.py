@@ -25,7 +25,9 @@ _SHOWN_KEYS = 5
 _BEAT = 10.0
 _FLAWS = 20  # parts that are named when they are not whole
 # Here, for the help must not load all that lists them.
-_PACKAGED = "controllers, gains, laws, payload_and_phase, stability_map"
+_PACKAGED = (
+    "controllers, delay_and_period, encoder_bits, gains, laws, payload_and_friction, payload_and_phase, stability_map"
+)
 
 
 def batch(
