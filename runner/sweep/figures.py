@@ -100,7 +100,7 @@ def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
         row[0].set_ylabel(runs.title(column).replace(" error", "\nerror"))
         for other in row[1:]:
             other.sharey(row[0])
-            other.tick_params(labelleft=False)
+            other.tick_params(labelleft=False, which="both")
         for g, (first, rest) in enumerate(split):
             if first not in columns or rest not in lines:
                 continue
@@ -115,8 +115,9 @@ def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
                 runs[key][stops], np.full(stops.sum(), 0.96), "x", color=style["color"], transform=top, markersize=4
             )
         known = runs[column][runs.ok & np.isfinite(runs[column])]
-        if known.size and known.min() > 0 and known.max() > 5 * known.min():
+        if known.size and known.min() > 0 and known.max() > 10 * known.min():
             row[0].set_yscale("log")
+            plain_decades(row[0].yaxis)
         if column.startswith("chatter"):
             for axes in row:
                 axes.axhline(CHATTERING, color="black", linewidth=0.6, label=f"chattering above {CHATTERING:g} 1/s")
