@@ -115,7 +115,7 @@ def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
                 runs[key][stops], np.full(stops.sum(), 0.96), "x", color=style["color"], transform=top, markersize=4
             )
         known = runs[column][runs.ok & np.isfinite(runs[column])]
-        if known.size and known.min() > 0 and known.max() > 10 * known.min():
+        if known.size and known.min() > 0 and known.max() > 5 * known.min():
             row[0].set_yscale("log")
             plain_decades(row[0].yaxis)
         if column.startswith("chatter"):
