@@ -17,6 +17,12 @@ def _late(study: Study, column: str, scenario: str) -> float:
     return study.evidence.runs[scenario].largest(column)
 
 
+def _error_of(quantity: str) -> tuple[str, str]:
+    """The joint that a figure's quantity belongs to, and the column of its error."""
+    joint = "lift" if "lift" in quantity else "rotation"
+    return joint, f"{'velocity_error' if 'vel' in quantity else 'e'}_{joint}"
+
+
 def _sea(study: Study) -> str:
     terms = study.scenarios["paper/group1_shake"].document["base_motion"].get("heave", [])  # another kind has none
     parts = [term["amplitude"] * term["omega"] ** 2 / np.sqrt(2) for term in terms]
@@ -30,10 +36,9 @@ def _sea(study: Study) -> str:
 
 def _first(quantity: str, unit: str) -> Callable[[Study], str]:
     def sentence(study: Study) -> str:
-        joint = "lift" if "lift" in quantity else "rotation"
+        joint, column = _error_of(quantity)
         names = ("shake", "pitch", "roll")
         settled = max(study.evidence.runs[f"paper/group1_{name}"].metric("settling_time", joint) for name in names)
-        column = f"{'velocity_error' if 'vel' in quantity else 'e'}_{joint}"
         sizes = [number(1e3 * _late(study, column, f"paper/group1_{name}"), 2) for name in names]
         return (
             f"All settle within {settled:.2f} s; in the second half of the run the errors reach {sizes[0]} (shake), "
@@ -45,8 +50,7 @@ def _first(quantity: str, unit: str) -> Callable[[Study], str]:
 
 def _laws(quantity: str, unit: str) -> Callable[[Study], str]:
     def sentence(study: Study) -> str:
-        joint = "lift" if "lift" in quantity else "rotation"
-        column = f"{'velocity_error' if 'vel' in quantity else 'e'}_{joint}"
+        _, column = _error_of(quantity)
         new, double, power = (
             number(1e3 * study.evidence.law(law).largest(column), 2)
             for law in ("variable_power_log", "double_power", "power")
@@ -80,8 +84,7 @@ def _burst(study: Study) -> str:
 
 def _payloads(quantity: str, unit: str) -> Callable[[Study], str]:
     def sentence(study: Study) -> str:
-        joint = "lift" if "lift" in quantity else "rotation"
-        column = f"{'velocity_error' if 'vel' in quantity else 'e'}_{joint}"
+        _, column = _error_of(quantity)
         sizes = [
             number(1e3 * _late(study, column, f"paper/group3_{name}"), 2)
             for name in ("payload_minus", "nominal", "payload_plus")
