@@ -29,7 +29,9 @@ class Linearisation:
 
     plant      (w, x, u, p) -> dx and its derivatives by x, u
     control    (w, x, z, s, h, p) -> u, dz, ahead, and of each the derivatives by x, z; sigma and its likewise
-    by_sigma   (w, x, z, s, h, p) -> u, dz, ahead: what an equivalent gain is computed from
+    held       the same of a control that is sampled with the period h and makes out its rates of differences: z has
+               what it remembers for that, dz is empty. None where rates are measured: `control` says it all
+    by_sigma, held_by_sigma  (w, x, z, s, h, p) -> u, dz, ahead: what an equivalent gain is computed from
     law        (w, x, z, s, h, p) -> what the reaching law asks for before a_max, but for its sign; zero without one
     euler      whether z goes on by an explicit Euler step where the control is sampled
     cut        whether there is a sliding variable, and so an s; it has no entries otherwise
@@ -75,25 +77,58 @@ class Linearisation:
     def euler(self) -> bool:
         """Whether an explicit Euler step takes z to the next sample."""
         signals = self.system.stated_control
-        step = self.system.z + self.system.h * signals.dz
+        step = self.system.z[: self.own_states] + self.system.h * signals.dz
         return bool(ca.is_equal(ca.densify(signals.ahead), ca.densify(step), 8))
 
     @derived_property
     def control(self) -> ca.Function:
-        """u, dz, ahead, sigma, each followed by its derivatives by x and z."""
+        """u, dz, ahead, sigma, each followed by its derivatives by x and z: of a continuous control, by z without what
+        differences are made of.
+        """
         s, results, sigma, _ = self._written
-        x, z = self.system.x, self.system.z
+        return self._derived("linear_control", s, results, sigma, self.system.z[: self.own_states])
+
+    @derived_property
+    def held(self) -> ca.Function | None:
+        """The same of a sampled control whose rates are made of differences."""
+        if not self.system.structure.differenced:
+            return None
+        s, results, sigma = self._told
+        return self._derived("linear_held", s, results, sigma, self.system.z)
+
+    @property
+    def own_states(self) -> int:
+        """How many entries of z, its first, are not what differences are made of."""
+        return int(self.system.stated_control.dz.numel())
+
+    @derived_property
+    def _told(self) -> tuple[ca.SX, list[ca.SX], ca.SX]:
+        """s; u, nothing for dz, ahead; sigma: with the rates that are made of differences."""
+        s, (command, _, ahead), sigma, _ = self._written
+        told, remembered = self.system.told()
+        with as_written():
+            command, ahead, sigma = ca.substitute([command, ahead, sigma], [self.system.x], [told])
+        return s, [command, ca.SX(0, 1), ca.vertcat(ahead, remembered)], sigma
+
+    def _derived(self, name: str, s: ca.SX, results: Sequence[ca.SX], sigma: ca.SX, z: ca.SX) -> ca.Function:
+        x = self.system.x
         outputs = [
             item for value in (*results, sigma) for item in (value, ca.jacobian(value, x), ca.jacobian(value, z))
         ]
         names = [f"{name}{by}" for name in ("u", "dz", "ahead", "sigma") for by in ("", "_x", "_z")]
-        return self._function("linear_control", s, outputs, names)
+        return self._function(name, s, outputs, names)
 
     @derived_property
     def by_sigma(self) -> ca.Function:
         """u, dz, ahead."""
         s, results, _, _ = self._written
         return self._function("control_by_sigma", s, results, ["u", "dz", "ahead"])
+
+    @derived_property
+    def held_by_sigma(self) -> ca.Function:
+        """u, nothing, ahead, with rates that are made of differences."""
+        s, results, _ = self._told
+        return self._function("held_by_sigma", s, results, ["u", "dz", "ahead"])
 
     @derived_property
     def law(self) -> ca.Function:

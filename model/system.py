@@ -515,9 +515,7 @@ class System:
         if not self.structure.differenced:
             return seen
         with noted() as terms:
-            own = self.z[self.z.numel() - self._differencing :]
-            rates, after = differenced(self._state, self.joints, own, self._sensor.velocity_cutoff, self.h)
-        told = ca.vertcat(*(rates.get(item, symbol) for item, symbol in self._state.items()))
+            told, after = self.told()
         named_before = self._terms["control"]
         known = [seen.command, seen.wished, seen.error, seen.sigma, seen.a_law, seen.ahead, *seen.parts.values()]
         with as_written():
@@ -530,6 +528,12 @@ class System:
             *(replace(term, value=value) for term, value in zip(named_before, late, strict=True)),
         )
         return ControlSignals(command, wished, parts, error, sigma, a_law, ca.SX(0, 1), ca.vertcat(ahead, after))
+
+    def told(self) -> tuple[ca.SX, ca.SX]:
+        """The state with rates that are made of differences, and what is remembered for them after the sample."""
+        own = self.z[self.z.numel() - self._differencing :]
+        rates, after = differenced(self._state, self.joints, own, self._sensor.velocity_cutoff, self.h)
+        return ca.vertcat(*(rates.get(item, symbol) for item, symbol in self._state.items())), after
 
     @property
     def _differencing(self) -> int:

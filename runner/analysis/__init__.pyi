@@ -1,7 +1,7 @@
 from .analysis import Analysis as Analysis
 from .analysis import analyze as analyze
 from .analysis import Row as Row
-from .continuous import delta_critical as delta_critical
+from .boundary_layer import delta_critical as delta_critical
 from .continuous import growth as growth
 from .continuous import spectrum as spectrum
 from .crossings import delay_max as delay_max
@@ -10,8 +10,8 @@ from .crossings import Margins as Margins
 from .floquet import common_period as common_period
 from .floquet import floquet_exponent as floquet_exponent
 from .gain import equivalent_gain as equivalent_gain
-from .limit_cycle import LimitCycle as LimitCycle
 from .limit_cycle import limit_cycle as limit_cycle
+from .limit_cycle import LimitCycle as LimitCycle
 from .limits import limits_from as limits_from
 from .loop import Boundary as Boundary
 from .loop import linear_loop as linear_loop

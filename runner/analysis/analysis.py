@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springline.runner.analysis import confirm as by_runs
-from springline.runner.analysis.continuous import delta_critical, growth
+from springline.runner.analysis.boundary_layer import delta_critical
 from springline.runner.analysis.crossings import Margins, delay_max, margins
 from springline.runner.analysis.floquet import floquet_exponent
 from springline.runner.analysis.limit_cycle import LimitCycle, limit_cycle
@@ -22,7 +22,7 @@ from springline.runner.analysis.loop import Boundary, LinearLoop, linear_loop
 from springline.runner.analysis.modes import TimeScales, fast_gain, time_scales
 from springline.runner.analysis.proof import Proof, proof_of, proof_reaches
 from springline.runner.analysis.reaching import AMPLITUDES
-from springline.runner.analysis.sampled import period_max, radius
+from springline.runner.analysis.sampled import period_max, rates_of
 from springline.runner.files import InputError, Problem
 from springline.runner.run import Progress, simulate
 from springline.runner.scenario import Scenario, expect_scenario, given_text
@@ -178,9 +178,7 @@ class _Work:
 
     def rate_of(self, loop: LinearLoop) -> float:
         """Largest growth rate of a loop as it runs, 1/s."""
-        if self.sampled:
-            return math.log(max(float(radius(loop)[0]), 1e-300)) / self.period
-        return float(growth(loop)[0])
+        return float(rates_of(loop).max())
 
     @cached_property
     def rate(self) -> float:

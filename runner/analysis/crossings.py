@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from springline.runner.analysis.continuous import growth
 from springline.runner.analysis.loop import Boundary, LinearLoop
+from springline.runner.analysis.roots import roots
 from springline.runner.analysis.sampled import (
     LONGEST_HISTORY,
     OpenLoop,
@@ -27,6 +27,7 @@ from springline.runner.analysis.sampled import (
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Places = NDArray[np.intp]
 
 _PARTS = 8
 # Of a sample: delays that are tried between two whole ones.
@@ -46,6 +47,9 @@ class Margins:
     gain_frequency      at which it would oscillate then, rad/s; NaN without
     phase               least phase, rad, whose lag or lead would bring it there; inf without
     phase_frequency     likewise
+    delay               least delay of the channel alone, s, that brings it there, over all frequencies at which its
+                        response has the size 1: not that of the least phase, where a faster one has less; inf without
+    delay_frequency     likewise
     at                  time along the reference of the least phase, or of the gain where there is no phase, s
     """
 
@@ -55,25 +59,34 @@ class Margins:
     gain_frequency: Floats
     phase: Floats
     phase_frequency: Floats
+    delay: Floats
+    delay_frequency: Floats
     at: Floats
 
 
 class _Response:
-    """Frequency response C (s - F)^-1 G of matrices at one operating point, in rad/s."""
+    """Frequency responses C (s - F)^-1 G of matrices at several operating points, (points, ...), in rad/s."""
 
     def __init__(self, f: Floats, g: Floats, c: Floats, period: float | None) -> None:
         self.f, self.g, self.c, self.period = f, g, c, period
 
-    def __call__(self, omega: Floats) -> Complex:
-        """(frequencies, outputs, inputs)."""
-        point = 1j * omega if self.period is None else np.exp(1j * omega * self.period)
-        matrix = np.asarray(point)[..., None, None] * np.eye(len(self.f)) - self.f
-        found: Complex = self.c @ np.linalg.solve(matrix, np.broadcast_to(self.g, (*matrix.shape[:-2], *self.g.shape)))
+    def __call__(self, omega: Floats, at: Places) -> Complex:
+        """At frequencies of the points `at`: (frequencies, outputs, inputs)."""
+        variable = 1j * omega if self.period is None else np.exp(1j * omega * self.period)
+        matrix = variable[:, None, None] * np.eye(self.f.shape[-1]) - self.f[at]
+        found: Complex = self.c[at] @ np.linalg.solve(matrix, self.g[at].astype(complex))
         return found
 
-    def grid(self) -> Floats:
-        """Frequencies above zero, up to where nothing happens any more, dense beside the poles, open and closed."""
-        poles = np.concatenate([np.linalg.eigvals(self.f), np.linalg.eigvals(self.f + self.g @ self.c)]).astype(complex)
+    def grid(self) -> tuple[Floats, Places]:
+        """Frequencies above zero, up to where nothing happens any more, dense beside the poles, open and closed.
+
+        They rise for one point after the other, and which point it is stands beside them.
+        """
+        opened, closed = np.linalg.eigvals(self.f), np.linalg.eigvals(self.f + self.g @ self.c)
+        grids = [self._frequencies(np.concatenate(pair).astype(complex)) for pair in zip(opened, closed, strict=True)]
+        return np.concatenate(grids), np.repeat(np.arange(len(grids)), [len(grid) for grid in grids])
+
+    def _frequencies(self, poles: Complex) -> Floats:
         if self.period is not None:
             poles = np.log(np.where(np.abs(poles) > 0.0, poles, 1e-300)) / self.period
             highest = np.pi / self.period
@@ -90,31 +103,48 @@ class _Response:
         return inside
 
 
-def _roots(f: Callable[[float], float], grid: Floats, values: Floats) -> list[float]:
-    """Where f changes its sign between neighbours of a grid, at which it has `values`."""
-    changes = np.flatnonzero(np.signbit(values[1:]) != np.signbit(values[:-1]))
-    return [float(brentq(f, grid[k], grid[k + 1], xtol=1e-12 * grid[k + 1], rtol=1e-12)) for k in changes]
+def _roots(
+    f: Callable[[Floats, Places], Floats], grid: Floats, at: Places, values: Floats
+) -> tuple[Floats, Places]:
+    """Where f, of frequencies and points, changes its sign between neighbours of a grid, at which it has `values`."""
+    changes = np.flatnonzero((np.signbit(values[1:]) != np.signbit(values[:-1])) & (at[1:] == at[:-1]))
+    places = at[changes]
+    return roots(lambda omega: f(omega, places), grid[changes], grid[changes + 1], 1e-12), places
 
 
-def _least_delay(response: _Response) -> tuple[float, float]:
-    """Smallest delay, s, alike in all channels, that brings a root to the axis, and its frequency; inf without.
+def _least_delay(response: _Response) -> tuple[float, float, int]:
+    """Smallest delay, s, alike in all channels, that brings a root to the axis, its frequency, and at which point.
 
-    Of a sampled loop, whose delays are whole samples, it is one that there would be between two of them.
+    inf without. Of a sampled loop, whose delays are whole samples, it is one that there would be between two of them.
     """
-    grid = response.grid()
+    grid, at = response.grid()
 
-    def sizes(omega: Floats) -> Floats:
-        found: Floats = np.sort(np.abs(np.linalg.eigvals(response(omega))), axis=-1)
+    def sizes(omega: Floats, at: Places) -> Floats:
+        found: Floats = np.sort(np.abs(np.linalg.eigvals(response(omega, at))), axis=-1)
         return found
 
-    tables = sizes(grid) - 1.0
-    best = (np.inf, np.nan)
+    tables = sizes(grid, at) - 1.0
+    best = (np.inf, np.nan, 0)
     for k in range(tables.shape[-1]):
-        for omega in _roots(lambda w, k=k: float(sizes(np.array([w]))[0, k]) - 1.0, grid, tables[:, k]):  # type: ignore[misc]
-            values = np.linalg.eigvals(response(np.array([omega]))[0])
-            turned = values[np.argsort(np.abs(values))[k]]
-            best = min(best, (float(np.angle(turned) % (2 * np.pi)) / omega, omega))
+
+        def excess(omega: Floats, at: Places, k: int = k) -> Floats:
+            return sizes(omega, at)[:, k] - 1.0
+
+        found, places = _roots(excess, grid, at, tables[:, k])
+        if not found.size:
+            continue
+        values = np.linalg.eigvals(response(found, places))
+        turned = np.take_along_axis(values, np.argsort(np.abs(values), axis=-1), axis=-1)[:, k]
+        delays = _lags(turned, found)
+        least = int(delays.argmin())
+        best = min(best, (float(delays[least]), float(found[least]), int(places[least])))
     return best
+
+
+def _lags(turned: Complex, omega: Floats) -> Floats:
+    """Delays, s, that turn back what is turned by a loop's response of size 1."""
+    found: Floats = np.angle(turned) % (2 * np.pi) / omega
+    return found
 
 
 def delay_max(loop: LinearLoop) -> tuple[Boundary, ...]:
@@ -132,14 +162,11 @@ def _delay_max(loop: LinearLoop) -> Boundary:
     if unstable:
         return Boundary(None, "the loop is unstable without any delay")
     opened = continuous(loop) if period is None else sampled(loop, period, 0.0)
-    found = [
-        _least_delay(_Response(opened.F[0, k], opened.G[0, k], opened.C[0, k], period)) for k in range(len(loop.times))
-    ]
-    delay, omega = min(found)
+    delay, omega, place = _least_delay(_Response(opened.F[0], opened.G[0], opened.C[0], period))
     if not np.isfinite(delay):
         return Boundary(None, "every delay is stable")
     if period is None:
-        return Boundary(delay, f"unstable above, at {omega:.4g} rad/s", float(loop.times[found.index((delay, omega))]))
+        return Boundary(delay, f"unstable above, at {omega:.4g} rad/s", float(loop.times[place]))
     return _between_samples(loop, period, delay)
 
 
@@ -179,44 +206,44 @@ def _margins(opened: OpenLoop, times: Floats) -> Margins:
 
 def _channel(opened: OpenLoop, times: Floats, joint: int) -> tuple[float, ...]:
     """The entries of Margins for one joint."""
-    up, down = (np.inf, np.nan, np.nan), (0.0, np.nan, np.nan)
-    phase = (np.inf, np.nan, np.nan)
     others = [k for k in range(opened.G.shape[-1]) if k != joint]
-    for k, time in enumerate(times):
-        f, g, c = opened.F[0, k], opened.G[0, k], opened.C[0, k]
-        response = _Response(f + g[:, others] @ c[others], g[:, [joint]], c[[joint]], opened.period)
-        gains, phases = _boundaries(response)
-        for factor, omega in gains:
-            if factor >= 1.0:
-                up = min(up, (factor, omega, float(time)))
-            else:
-                down = max(down, (factor, omega, float(time)))
-        for angle, omega in phases:
-            phase = min(phase, (angle, omega, float(time)))
+    f, g, c = opened.F[0], opened.G[0], opened.C[0]
+    rest = f + g[:, :, others] @ c[:, others]
+    response = _Response(rest, g[:, :, [joint]], c[:, [joint]], opened.period)
+    grid, at = response.grid()
+    values = response(grid, at)[:, 0, 0]
+
+    def imaginary(omega: Floats, at: Places) -> Floats:
+        return np.asarray(response(omega, at)[:, 0, 0].imag, dtype=np.float64)
+
+    def excess(omega: Floats, at: Places) -> Floats:
+        return np.asarray(np.abs(response(omega, at)[:, 0, 0]) - 1.0, dtype=np.float64)
+
+    up, down = (np.inf, np.nan, np.nan), (0.0, np.nan, np.nan)
+    for factor, omega, place in _factors(response, *_roots(imaginary, grid, at, values.imag)):
+        if factor >= 1.0:
+            up = min(up, (factor, omega, float(times[place])))
+        else:
+            down = max(down, (factor, omega, float(times[place])))
     nearest = up if down[0] == 0.0 or up[0] < 1 / down[0] else down
-    at = phase[2] if np.isfinite(phase[0]) else nearest[2]
-    return up[0], down[0], nearest[0], nearest[1], phase[0], phase[1], at
+    crossed, places = _roots(excess, grid, at, np.abs(values) - 1.0)
+    if not crossed.size:
+        return up[0], down[0], nearest[0], nearest[1], np.inf, np.nan, np.inf, np.nan, nearest[2]
+    turned = response(crossed, places)[:, 0, 0]
+    angles, delays = np.abs(np.angle(turned)), _lags(turned, crossed)
+    k, late = int(angles.argmin()), int(delays.argmin())
+    phase, delay = (float(angles[k]), float(crossed[k])), (float(delays[late]), float(crossed[late]))
+    return up[0], down[0], nearest[0], nearest[1], *phase, *delay, float(times[places[k]])
 
 
-def _boundaries(response: _Response) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
-    """Factors, and phases (rad), with their frequencies, at which a loop of one channel is at its boundary."""
-
-    def at(omega: float) -> complex:
-        return complex(response(np.array([omega]))[0, 0, 0])
-
-    grid = response.grid()
-    values = response(grid)[:, 0, 0]
-    gains = []
-    for omega in _roots(lambda w: at(w).imag, grid, values.imag):
-        here = at(omega).real
-        gains.append((here, omega))
+def _factors(response: _Response, crossed: Floats, places: Places) -> list[tuple[float, float, int]]:
+    """Gains that bring a loop of one channel to its boundary, with frequency and point: where its response is real."""
+    found = list(zip(response(crossed, places)[:, 0, 0].real, crossed, places, strict=True))
     for omega in [0.0] if response.period is None else [0.0, np.pi / response.period]:
-        try:
-            gains.append((at(omega).real, omega))
-        except np.linalg.LinAlgError:  # an integrator: the response has no bound there, and no gain a boundary
-            continue
-    phases = [
-        (abs(float(np.angle(at(omega)))), omega)
-        for omega in _roots(lambda w: abs(at(w)) - 1.0, grid, np.abs(values) - 1.0)
-    ]
-    return [(1 / here, omega) for here, omega in gains if 1 / _FARTHEST < here < _FARTHEST], phases
+        for place in range(len(response.f)):
+            try:
+                real = response(np.array([omega]), np.array([place]))[0, 0, 0].real
+            except np.linalg.LinAlgError:  # an integrator: the response has no bound there, and no gain a boundary
+                continue
+            found.append((real, omega, place))
+    return [(float(1 / real), float(at), int(k)) for real, at, k in found if 1 / _FARTHEST < real < _FARTHEST]

@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from springline.runner.analysis.continuous import growth
 from springline.runner.analysis.loop import AMPLITUDE, Boundary, linear_loop
@@ -22,8 +21,8 @@ _RATIONAL = 1e-9
 # Relative: how near to a ratio of whole numbers two frequencies must be.
 _CYCLES = 400
 # Of the fastest term in the common period: beyond it, the answer would take longer than it is worth.
-_SAMPLES, _FINE = 24, 96
-# Of the matrix, and steps of the integration, a cycle of the fastest term.
+_SAMPLES, _FINEST = 24, 4
+# Of the matrix, a cycle of the fastest term; and steps of the integration, a sample.
 _PASSES = 3
 
 
@@ -76,16 +75,24 @@ def floquet_exponent(scenario: Scenario, amplitude: ArrayLike = AMPLITUDE) -> Bo
     cycles = max(period * fastest / (2 * math.pi), 1.0)
     times = np.linspace(0.0, period, math.ceil(max(_SAMPLES * cycles, 64)), endpoint=False)
     matrices = linear_loop(scenario, amplitude, times=times).closed()[0]
-    curve = CubicSpline(np.append(times, period), np.concatenate([matrices, matrices[:1]]), bc_type="periodic")
-    steps = math.ceil(max(_FINE * cycles, 256))
-    return Boundary(_exponent(_transitions(curve, period, steps), period), reason)
+    return Boundary(_exponent(_transitions(matrices, period), period), reason)
 
 
-def _transitions(curve: CubicSpline, period: float, steps: int) -> Floats:
-    """exp of Magnus's series of fourth order for each step of a period, (steps, m, m)."""
+def _transitions(matrices: Floats, period: float) -> Floats:
+    """exp of Magnus's series of fourth order for each step of a period, (steps, m, m).
+
+    matrices  equally spaced over the period; between them the trigonometric polynomial through all
+    """
+    steps = _FINEST * len(matrices)
     step = period / steps
-    middle = (np.arange(steps) + 0.5) * step
-    early, late = (curve(middle + sign * step * math.sqrt(3) / 6) for sign in (-1, 1))
+    spectrum = np.fft.rfft(matrices, axis=0)
+    turns = 2j * np.pi * np.arange(len(spectrum))[:, None, None] / steps
+
+    def at(share: float) -> Floats:
+        found: Floats = np.fft.irfft(spectrum * np.exp(turns * share), steps, axis=0) * _FINEST
+        return found
+
+    early, late = (at(0.5 + sign * math.sqrt(3) / 6) for sign in (-1, 1))
     turned = late @ early - early @ late
     return exponential(step / 2 * (early + late) + math.sqrt(3) / 12 * step**2 * turned)
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
-from springline.runner.analysis.loop import LinearLoop, linear_loop, linearised
-from springline.runner.analysis.sampled import cut
+from springline.runner.analysis.loop import LinearLoop, linearised, points_of
+from springline.runner.analysis.roots import root
+from springline.runner.analysis.sampled import cut, rates_of
 from springline.runner.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -50,20 +50,16 @@ def limit_cycle(scenario: Scenario, *, times: ArrayLike | None = None) -> LimitC
 
     It is where the loop, unstable for smaller amplitudes of sigma and stable for larger ones, is neither: the first
     such amplitude between 1e-6 and 10, all joints in the ratio of the critical mode, at the time along the reference
-    where it is
-    largest. Where the loop is stable in the small, only what starts above that reaches it, and the reason says so.
+    where it is largest. Where the loop is stable in the small, only what starts above that reaches it, and the reason says so.
     """
     if not linearised(scenario).cut:
         return LimitCycle(None, None, None, "the controller has no sliding variable, and so no gain by amplitude")
 
-    def growth(sizes: Floats, at: ArrayLike | None) -> Floats:
-        exponents, _ = _modes(linear_loop(scenario, sizes, times=at))
-        found: Floats = exponents.real[0].max(axis=-1)
-        return found
-
+    points = points_of(scenario, times=times)
     n = scenario.system().n
     shape = np.ones(n)
-    table = np.array([growth(size * shape, times) for size in _SIZES])
+    spread = points.repeated(len(_SIZES)).loop(_SIZES[:, None] * shape)
+    table = rates_of(spread)
     falls = (table[:-1] >= 0.0) & (table[1:] < 0.0)
     if not falls.any():
         grows = bool((table[-1] >= 0.0).any())
@@ -71,23 +67,23 @@ def limit_cycle(scenario: Scenario, *, times: ArrayLike | None = None) -> LimitC
         return LimitCycle(None, None, None, text or "stable at every amplitude from 1e-6 to 10")
     first = np.where(falls.any(axis=0), falls.argmax(axis=0), -1)  # a loop that starts small gets no further
     last = int(first.max())
-    every = np.linspace(0.0, scenario.step * scenario.steps, table.shape[1]) if times is None else np.atleast_1d(times)
-    at = float(every[int(np.where(first == last, table[last], -np.inf).argmax())])
+    place = int(np.where(first == last, table[last], -np.inf).argmax())
+    points, at = points.at_time(place), float(points.times[place])
     low, high = _SIZES[last], _SIZES[last + 1]
     size, frequency = 0.0, 0.0
     for _ in range(_ROUNDS):
 
         def excess(log_size: float, shape: Floats = shape) -> float:
-            return float(growth(np.exp(log_size) * shape, [at])[0])
+            return float(rates_of(points.loop(np.exp(log_size) * shape))[0, 0])
 
         ends = np.log([low, high])
         while excess(ends[0]) < 0.0 and ends[0] > np.log(_SIZES[0]):
             ends[0] -= 1.0
         while excess(ends[1]) >= 0.0 and ends[1] < np.log(_SIZES[-1]) + 5.0:
             ends[1] += 1.0
-        size = float(np.exp(brentq(excess, *ends, xtol=1e-6)))
+        size = float(np.exp(root(excess, ends, 1e-7)))
         low, high = 0.9 * size, 1.1 * size
-        loop = linear_loop(scenario, size * shape, times=[at])
+        loop = points.loop(size * shape)
         exponents, vectors = _modes(loop)
         critical = int(exponents.real[0, 0].argmax())
         mode, frequency = vectors[0, 0][:, critical], abs(float(exponents[0, 0, critical].imag))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import casadi as ca
@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from springline.model import Linearisation, Structure, linearisation_of
 from springline.model.symbolic import derivation, over_runs
 from springline.runner.analysis.gain import quadrature
-from springline.runner.files import InputError, Problem
 from springline.runner.scenario import Scenario, kernel_tables
 
 Floats = NDArray[np.float64]
@@ -44,7 +43,7 @@ class Boundary:
 class LinearLoop:
     """Plant and control at some times for some runs; all arrays are (runs, times, ...), SI units.
 
-    amplitude  of sigma, (n,), for which the gains hold
+    amplitude  of sigma, (n,) or (runs, n), for which the gains hold
     times      s;  values: parameter vectors, (runs, slots)
     x, u, z    operating points: on the reference, with the motors and the forces that carry it
     A, B       of the plant: dx = A x + B u
@@ -110,12 +109,16 @@ class LinearLoop:
         a, b, cx, dx = self.driven()
         return joined(a + b @ cx, b @ self.Cz, dx, self.Dz)
 
-    def advance(self, period: float) -> tuple[Floats, Floats]:
-        """Ex, Ez of the control's states a sample of `period` s later: z' = Ex x + Ez z."""
-        if not self.z.shape[-1] or linearised(self.scenario).euler:
-            return period * self.Dx, np.eye(self.z.shape[-1]) + period * self.Dz
-        found = _control(self.scenario, self.values, self.times, self.x, self.z, self.amplitude, period)
-        return found["ahead_x"], found["ahead_z"]
+    def held(self, period: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Cx, Cz and Ex, Ez of the control with samples of `period` s: u = Cx x + Cz z, a sample later z' = Ex x + Ez z.
+
+        Of rates that are made of differences, z has what they are made of behind the controller's own states.
+        """
+        if not linearised(self.scenario).held and (not self.z.shape[-1] or linearised(self.scenario).euler):
+            return self.Cx, self.Cz, period * self.Dx, np.eye(self.z.shape[-1]) + period * self.Dz
+        points = Points(self.scenario, self.times, self.values, self.x, self.u, self.z, self.A, self.B)
+        found = _control(points, self.amplitude, period)
+        return found["u_x"], found["u_z"], found["ahead_x"], found["ahead_z"]
 
 
 def _padded(rows: Floats, n: int) -> Floats:
@@ -143,29 +146,82 @@ def linear_loop(
     columns    numbers that are other for each run, by numeric key; one run without
     values     parameter vectors (runs, slots) in place of columns
     Limits U_max, noise, resolution and rate limits are not part of it: they are inactive in the small (`limits_from`).
-    Raises InputError for columns that a scenario refuses and for rates that are made of differences, ValueError for a
-    controller that cannot be cut at its sigma.
+    Rates that are made of differences have a linear loop where they are sampled (`LinearLoop.held`); all else is of
+    rates as they are. Raises InputError for columns that a scenario refuses, ValueError for a controller that cannot be
+    cut at its sigma.
     """
-    if scenario.structure().differenced:
-        text = "rates made of differences have no linear loop here: expected 'measured' for an analysis"
-        raise InputError(Problem(scenario.source, "sensor.velocity", text, '"differenced"'))
+    return points_of(scenario, times=times, columns=columns, values=values).loop(amplitude)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Points:
+    """Where loops of any amplitude are linearised, and the plant there: as of a LinearLoop, (runs, times, ...)."""
+
+    scenario: Scenario
+    times: Floats
+    values: Floats
+    x: Floats
+    u: Floats
+    z: Floats
+    A: Floats
+    B: Floats
+
+    def loop(self, amplitude: ArrayLike) -> LinearLoop:
+        """The loop there; amplitude: one number, one a joint, or (runs, joints)."""
+        sizes = np.asarray(amplitude, float)
+        sizes = np.broadcast_to(sizes, np.broadcast_shapes(sizes.shape, self.u.shape[-1:]))
+        control = _control(self, sizes, 0.0)
+        lags = slots_of(self.scenario, "actuator.lag")
+        lag = self.values[:, lags] if lags else np.zeros((len(self.values), self.u.shape[-1]))
+        reach = control["u_s"]
+        return LinearLoop(
+            self.scenario, sizes, self.times, self.values, self.x, self.u, self.z, self.A, self.B,
+            control["u_x"], control["u_z"], control["dz_x"], control["dz_z"], control["sigma_x"], control["sigma_z"],
+            reach, _law_gain(self.scenario, self.values, self.x, reach), lag,
+        )  # fmt: skip
+
+    def with_control(self, key: str, numbers: Floats) -> Points:
+        """Of one run, as many as there are numbers: each for a parameter of the control."""
+        place = [slot.key for slot in self.scenario.system().slots].index(key)
+        values = np.repeat(self.values, len(numbers), axis=0)
+        values[:, place] = numbers
+        names = ("x", "u", "A", "B")
+        x, u, a, b = (np.repeat(getattr(self, name), len(numbers), axis=0) for name in names)
+        z = _states_of_control(self.scenario, values, self.times, x, u)
+        return Points(self.scenario, self.times, values, x, u, z, a, b)
+
+    def repeated(self, runs: int) -> Points:
+        """Of one run, as many alike."""
+        names = ("values", "x", "u", "z", "A", "B")
+        return replace(self, **{name: np.repeat(getattr(self, name), runs, axis=0) for name in names})
+
+    def at_time(self, place: int) -> Points:
+        """At one of the times."""
+        names = ("x", "u", "z", "A", "B")
+        few = {name: getattr(self, name)[:, place : place + 1] for name in names}
+        return replace(self, times=self.times[place : place + 1], **few)
+
+    def of_run(self, run: int) -> Points:
+        """One of the runs."""
+        names = ("values", "x", "u", "z", "A", "B")
+        return replace(self, **{name: getattr(self, name)[run : run + 1] for name in names})
+
+
+def points_of(
+    scenario: Scenario,
+    *,
+    times: ArrayLike | None = None,
+    columns: Mapping[str, ArrayLike] | None = None,
+    values: Floats | None = None,
+) -> Points:
+    """Where `linear_loop` linearises; arguments and what it raises as there."""
     if values is None:
         values = scenario.values_for(columns) if columns else scenario.values()[None, :]
     at = np.atleast_1d(np.asarray(np.linspace(0.0, _duration(scenario), _TIMES) if times is None else times, float))
+    values = unlimited(scenario, values)
     x, u, plant = _operating_points(scenario, values, at)
     z = _states_of_control(scenario, values, at, x, u)
-    sizes = np.broadcast_to(np.asarray(amplitude, float), u.shape[-1:])
-    control = _control(scenario, values, at, x, z, sizes, 0.0)
-    free = unlimited(scenario, values)
-    lags = slots_of(scenario, "actuator.lag")
-    n = u.shape[-1]
-    lag = values[:, lags] if lags else np.zeros((len(values), n))
-    reach = control["u_s"]
-    return LinearLoop(
-        scenario, sizes, at, free, x, u, z, plant["A"], plant["B"],
-        control["u_x"], control["u_z"], control["dz_x"], control["dz_z"], control["sigma_x"], control["sigma_z"],
-        reach, _law_gain(scenario, free, x, reach), lag,
-    )  # fmt: skip
+    return Points(scenario, at, values, x, u, z, plant["A"], plant["B"])
 
 
 def _law_gain(scenario: Scenario, values: Floats, x: Floats, reach: Floats) -> Floats:
@@ -275,10 +331,10 @@ def _operating_points(scenario: Scenario, values: Floats, times: Floats) -> tupl
 
 def _states_of_control(scenario: Scenario, values: Floats, times: Floats, x: Floats, u: Floats) -> Floats:
     """z with which the controller commands what carries the arm, as near to its start as may be; else its start."""
-    start = np.array(scenario.system().z_start)
+    start = np.array(scenario.system().z_start)[: linearised(scenario).own_states]
     z = np.tile(start, (*x.shape[:2], 1))
     for _ in range(3 if start.size else 0):
-        found = _control(scenario, values, times, x, z, None, 0.0)
+        found = _control(Points(scenario, times, values, x, u, z, x, u), None, 0.0)
         left = u - found["u"][..., 0]
         z = z + (np.linalg.pinv(found["u_z"]) @ left[..., None])[..., 0]
     return np.where(np.isfinite(z), z, start)
@@ -286,48 +342,74 @@ def _states_of_control(scenario: Scenario, values: Floats, times: Floats, x: Flo
 
 @derivation
 @lru_cache(maxsize=64)
-def _swept(structure: Structure) -> tuple[ca.Function, Floats, Floats]:
-    """by_sigma at all nodes of a sine in each entry of s; these s for amplitude 1; the weights."""
+def _swept(structure: Structure, held: bool) -> ca.Function:
+    """Equivalent gains of u, dz, ahead by each entry of sigma at amplitudes s, by the arguments of `by_sigma`."""
     linear = linearisation_of(structure)
-    sines, weights = quadrature()
-    n = linear.system.n
-    s = np.zeros((n, n * len(sines)))
-    for j in range(n):
-        s[j, j * len(sines) : (j + 1) * len(sines)] = sines
-    return linear.by_sigma.map("swept", "serial", s.shape[1], [0, 1, 2, 4, 5], []), s, weights
+    function = linear.held_by_sigma if held else linear.by_sigma
+    given = [ca.SX.sym(function.name_in(i), *function.size_in(i)) for i in range(function.n_in())]
+    s = given.pop(3)
+    outputs = function(*given[:3], s, *given[3:])
+    # What does not depend on s is computed once, not at every node.
+    written, symbols, known = ca.extract_parametric(ca.vertcat(*outputs), ca.vertcat(*given))
+    once = ca.vertcat(*symbols, *given)
+    node = ca.Function("node", [s, once], [written])
+    amplitudes, at = ca.SX.sym("amplitude", s.numel()), ca.vertcat(*known, *given)
+    gains = []
+    for j in range(s.numel()):
+        total = ca.SX(0)
+        for sine, weight in zip(*quadrature(), strict=True):
+            place = ca.SX(s.numel(), 1)
+            place[j] = amplitudes[j] * float(sine)
+            total = total + float(weight) * node(place, at)
+        gains.append(total / amplitudes[j])
+    ends = np.cumsum([0, *(output.numel() for output in outputs)]).tolist()
+    parts = ca.vertsplit(ca.densify(ca.horzcat(*gains)), ends)
+    return ca.Function("swept", [*given[:3], amplitudes, *given[3:]], parts)
 
 
-def _control(
-    scenario: Scenario, values: Floats, times: Floats, x: Floats, z: Floats, amplitude: Floats | None, period: float
-) -> dict[str, Floats]:
+def _control(points: Points, amplitude: Floats | None, period: float) -> dict[str, Floats]:
     """What the control is at operating points, by name, each (runs, times, rows, columns).
 
     Derivatives u_x, ... have the law's part in them; u_s, dz_s, ahead_s are its equivalent gains by sigma. Without an
-    amplitude they are zero.
+    amplitude they are zero. With a period, rates are made of differences where the scenario's are.
     """
-    system = scenario.system()
+    scenario, x = points.scenario, points.x
     linear = linearised(scenario)
-    runs, count, n = len(values), len(times), system.n
-    w = signal_values(scenario, values, times)
-    points = runs * count
-    p = _repeated(unlimited(scenario, values), count)
-    before, after = (_flat(w), _flat(x), _flat(z)), (np.full((1, points), period), p)
-    rest = np.zeros((n if linear.cut else 0, points))
-    names = [linear.control.name_out(k) for k in range(linear.control.n_out())]
+    held = linear.held if period > 0.0 else None
+    function = held or linear.control
+    runs, count, n = len(points.values), len(points.times), scenario.system().n
+    w = signal_values(scenario, points.values, points.times)
+    number = runs * count
+    p = _repeated(points.values, count)
+    z = _remembered(points, period)
+    before, after = (_flat(w), _flat(x), _flat(z)), (np.full((1, number), period), p)
+    rest = np.zeros((n if linear.cut else 0, number))
+    names = [function.name_out(k) for k in range(function.n_out())]
 
     def apart(results: list[Floats]) -> list[Floats]:
         return [item.reshape(runs, count, *item.shape[1:]) for item in results]
 
-    found = dict(zip(names, apart(over_runs(linear.control, *before, rest, *after)), strict=True))
-    for name, rows in (("u", n), ("dz", z.shape[-1]), ("ahead", z.shape[-1])):
-        found[f"{name}_s"] = np.zeros((runs, count, rows, n))
+    found = dict(zip(names, apart(over_runs(function, *before, rest, *after)), strict=True))
     if amplitude is None or not linear.cut:
-        return found
-    function, sines, weights = _swept(scenario.structure())
-    s = np.tile((amplitude[:, None] * sines).T.ravel()[:, None], points)
-    for name, values_at in zip(("u", "dz", "ahead"), apart(over_runs(function, *before, s, *after)), strict=True):
-        shape = (*values_at.shape[:3], n, len(weights))
-        found[f"{name}_s"] = gain = values_at.reshape(shape) @ weights / amplitude
-        for by in ("x", "z"):
+        gains = [np.zeros((runs, count, found[name].shape[-2], n)) for name in ("u", "dz", "ahead")]
+    else:
+        sizes = _repeated(np.broadcast_to(amplitude, (runs, n)), count)
+        gains = apart(over_runs(_swept(scenario.structure(), held is not None), *before, sizes, *after))
+    for name, gain in zip(("u", "dz", "ahead"), gains, strict=True):
+        found[f"{name}_s"] = gain
+        for by in ("x", "z") if linear.cut else ():
             found[f"{name}_{by}"] = found[f"{name}_{by}"] + gain @ found[f"sigma_{by}"]
     return found
+
+
+def _remembered(points: Points, period: float) -> Floats:
+    """z whole: behind the controller's own states, each position a sample before, and the rate that it made of them."""
+    more = points.scenario.system().z.numel() - points.z.shape[-1]
+    if not more:
+        return points.z
+    n = points.u.shape[-1]
+    blocks = np.split(points.x, points.x.shape[-1] // n, axis=-1)
+    pairs = zip(blocks[::2], blocks[1::2], strict=True)
+    past = [item for q, dq in pairs for item in (q - period * dq, dq)]
+    whole: Floats = np.concatenate([points.z, *past, np.ones((*points.z.shape[:2], 1))], axis=-1)
+    return whole

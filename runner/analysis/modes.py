@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linear_sum_assignment
 
 from springline.runner.analysis.loop import AMPLITUDE, Boundary, LinearLoop, joined, linear_loop, linearised
 from springline.runner.scenario import Scenario
@@ -123,22 +122,31 @@ def _composite(loop: LinearLoop) -> Complex:
     fast[..., 2 * n : 4 * n] = cx[..., 2 * n : 4 * n]
     fast[..., : 2 * n] = -cx[..., 2 * n : 4 * n]
     alone = _upper(_fast(loop, 1.0), n)
-    result = np.empty(alone.shape, complex)
 
     def at(share: float) -> Complex:
         c, d = fast + share * (cx - fast), share * loop.Cz
         found: Complex = np.linalg.eigvals(joined(a + b @ c, b @ d, share * dx, loop.Dz)).astype(complex)
         return found
 
-    paths = [at(share) for share in np.linspace(0.0, 1.0, _STEPS + 1)]
-    for place in np.ndindex(alone.shape[:2]):
-        modes = alone[place]
-        for values in paths:
-            distance = np.abs(values[place][None, :] - modes[:, None])
-            _, taken = linear_sum_assignment(distance)
-            modes = values[place][taken]
-        result[place] = modes
-    return result
+    modes = alone
+    for share in np.linspace(0.0, 1.0, _STEPS + 1):
+        values = at(share)
+        taken = _assigned(np.abs(values[..., None, :] - modes[..., :, None]))
+        modes = np.take_along_axis(values, taken, axis=-1)
+    return modes
+
+
+def _assigned(costs: Floats) -> NDArray[np.intp]:
+    """Which column each row takes, no two rows the same one, so that the costs are least, (..., rows)."""
+    nearest: NDArray[np.intp] = costs.argmin(axis=-1)
+    ordered = np.sort(nearest, axis=-1)
+    contested = (ordered[..., 1:] == ordered[..., :-1]).any(axis=-1)
+    if contested.any():
+        from scipy.optimize import linear_sum_assignment  # seldom needed, and half a second to load
+
+        for place in zip(*np.nonzero(contested), strict=True):
+            nearest[place] = linear_sum_assignment(costs[place])[1]
+    return nearest
 
 
 def fast_gain(
@@ -206,6 +214,6 @@ def _owners(loop: LinearLoop) -> NDArray[np.intp]:
         order = upper[np.argsort(np.abs(values[place][upper]))][:n]
         shares = np.abs(vectors[place][:n, order])
         weight = np.sqrt(np.abs(1 / loop.B[place][3 * n :, :].diagonal()))
-        _, owner = linear_sum_assignment(-(shares * weight[:, None]) / (shares * weight[:, None]).sum(axis=0))
-        result[place] = owner
+        weighted = shares * weight[:, None]
+        result[place] = _assigned(-weighted / weighted.sum(axis=0))
     return result

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from springline.codegen.files import canonical_json, write_tree
 from springline.runner.analysis.analysis import Analysis, mode_text
-from springline.runner.analysis.continuous import delta_critical, spectrum
+from springline.runner.analysis.boundary_layer import delta_critical
+from springline.runner.analysis.continuous import spectrum
 from springline.runner.analysis.figures import figures
 from springline.runner.analysis.limit_cycle import limit_cycle
 from springline.runner.analysis.modes import time_scales

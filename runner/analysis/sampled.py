@@ -54,8 +54,9 @@ def sampled(loop: LinearLoop, period: float, delay: float) -> OpenLoop:
 
     period  s;  delay: s, any that is not negative
     """
-    a, b, cx, _ = loop.driven()
-    n, plant, memory = loop.n, a.shape[-1], loop.z.shape[-1]
+    a, b, _, _ = loop.driven()
+    cx, cz, by_state, by_memory = loop.held(period)
+    n, plant, memory = loop.n, a.shape[-1], by_memory.shape[-1]
     whole = math.floor(delay / period + _WHOLE)
     part = max(delay - whole * period, 0.0)
     part = 0.0 if part < _WHOLE * period else part
@@ -76,14 +77,14 @@ def sampled(loop: LinearLoop, period: float, delay: float) -> OpenLoop:
     else:
         g[..., :plant, :] = late
     if memory:
-        by_state, by_memory = loop.advance(period)
         f[..., plant : plant + memory, : by_state.shape[-1]] = by_state
         f[..., plant : plant + memory, plant : plant + memory] = by_memory
     if history:
         first = plant + memory
         g[..., first : first + n, :] = np.eye(n)
         f[..., range(first + n, size), range(first, size - n)] = 1.0
-    c = np.concatenate([cx, loop.Cz, np.zeros((*cx.shape[:3], history))], axis=-1)
+    lags, waiting = (np.zeros((*cx.shape[:3], size)) for size in (plant - cx.shape[-1], history))
+    c = np.concatenate([cx, lags, cz, waiting], axis=-1)
     return OpenLoop(f, g, c, period)
 
 
@@ -155,11 +156,21 @@ def radius(loop: LinearLoop, period: float | None = None, delay: float | None = 
     return largest
 
 
+def rates_of(loop: LinearLoop) -> Floats:
+    """Largest growth rate, 1/s, of the loop as its scenario has it, (runs, times): unstable above 0."""
+    opened = cut(loop)
+    values = np.linalg.eigvals(opened.closed)
+    if opened.period is None:
+        return np.asarray(values.real.max(axis=-1), dtype=np.float64)
+    return np.asarray(np.log(np.maximum(np.abs(values).max(axis=-1), 1e-300)) / opened.period, dtype=np.float64)
+
+
 def one_run(loop: LinearLoop, run: int) -> LinearLoop:
     """One of the runs of a loop."""
     names = ("values", "x", "u", "z", "A", "B", "Cx", "Cz", "Dx", "Dz", "Sx", "Sz", "N", "law_gain", "lag")
     changes = {name: getattr(loop, name)[run : run + 1] for name in names}
-    return LinearLoop(scenario=loop.scenario, amplitude=loop.amplitude, times=loop.times, **changes)
+    amplitude = loop.amplitude[run] if loop.amplitude.ndim > 1 else loop.amplitude
+    return LinearLoop(scenario=loop.scenario, amplitude=amplitude, times=loop.times, **changes)
 
 
 def period_max(loop: LinearLoop) -> tuple[Boundary, ...]:
