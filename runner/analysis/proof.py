@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from springline.model import theory
 from springline.model.control import LAWS
-from springline.model.symbolic import derivation
+from springline.model.symbolic import derivation, over_runs
 from springline.model.system import System
 from springline.model.theory import Gap, Margin, SettlingBounds
 from springline.runner.analysis.loop import signal_values
@@ -91,11 +91,12 @@ def disturbance(scenario: Scenario, columns: Mapping[str, Floats]) -> tuple[Floa
     x = np.vstack([along(item.name) for item in system.drive.state])
     z = np.array([columns[entry.name] for entry in system.memory]).reshape(-1, len(t))
     w = signals_along(scenario, t)
-    rates = system.function("loop_plant")(w, x, along("U"), values).full()
+    p = np.repeat(values[:, None], len(t), axis=1)
+    rates = over_runs(system.function("loop_plant"), w, x, along("U"), p)[0][:, :, 0].T
     moved = np.zeros_like(w)
     moved[: 2 * n] = w[n : 3 * n]
     memory = [z] if system.memory else []
-    sigma, rate = (item.full() for item in _sliding(system)(w, x, *memory, moved, rates, values))
+    sigma, rate = (item[:, :, 0].T for item in over_runs(_sliding(system), w, x, *memory, moved, rates, p))
     law = reaching_law(scenario)
     limits = [float(limit) for limit in _per_joint(scenario, "a_max")]
     asked = np.array([limited(law, limit)(row) for limit, row in zip(limits, sigma, strict=True)])
@@ -136,9 +137,11 @@ def proof_of(scenario: Scenario, columns: Mapping[str, Floats]) -> Proof:
     q, dq = (np.array([columns[f"{name}_{joint.name}"][::every] for joint in system.joints]) for name in ("q1", "dq1"))
     w = signals_along(scenario, t[::every])
     base = np.split(w[3 * n : 3 * n + 3 * system.base.b.numel()], 3)
-    pushed = system.function("base_disturbance")(*base, q, dq, values).full()
-    mass = system.function("slow_mass")(q, values).full()  # H of each sample side by side
-    felt = theory.felt_acceleration(mass.reshape(n, -1, n).swapaxes(0, 1), pushed)
+    p = np.repeat(values[:, None], q.shape[1], axis=1)
+    (pushed,), (mass,) = over_runs(system.function("base_disturbance"), *base, q, dq, p), over_runs(
+        system.function("slow_mass"), q, p
+    )
+    felt = theory.felt_acceleration(mass, pushed[:, :, 0].T)
     margin = theory.margin(felt, number["control.k1"])
 
     law, limits = reaching_law(scenario), _per_joint(scenario, "a_max")
