@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from springline.runner.analysis.loop import AMPLITUDE, Boundary, Points, linearised, points_of
+from springline.runner.analysis.roots import root
 from springline.runner.analysis.sampled import rates_of
 from springline.runner.scenario import Scenario
 
@@ -52,18 +53,6 @@ def _least_layer(points: Points, amplitude: ArrayLike) -> Boundary:
     if not unstable.any():
         return Boundary(None, f"every boundary layer from {_LAYERS[0]:g} on is stable")
     last = int(np.flatnonzero(unstable)[-1])
-    value = refined(lambda layer: rates(layer).max(axis=1) < 0.0, layers[last], layers[last + 1])
+    value = root(lambda layer: float(rates(np.array([layer])).max()), layers[last : last + 2], 1e-6)
     worst = int(rates(np.array([value]))[0].argmax())
     return Boundary(value, "unstable below", float(points.times[worst]))
-
-
-def refined(holds: Callable[[Floats], NDArray[np.bool_]], low: float, high: float) -> float:
-    """Where between two positive numbers `holds` changes, to a part in 1e5; it is asked of eight at a time."""
-    first = bool(holds(np.array([low]))[0])
-    while high - low > 1e-5 * high:
-        inner = np.linspace(low, high, 10)[1:-1]
-        changed = np.flatnonzero(holds(inner) != first)
-        k = int(changed[0]) if changed.size else len(inner)
-        points = np.concatenate([[low], inner, [high]])
-        low, high = float(points[k]), float(points[k + 1])
-    return (low + high) / 2

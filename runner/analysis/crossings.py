@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from springline.runner.analysis.continuous import growth
 from springline.runner.analysis.loop import Boundary, LinearLoop
-from springline.runner.analysis.roots import roots
+from springline.runner.analysis.roots import root, roots
 from springline.runner.analysis.sampled import (
     LONGEST_HISTORY,
     OpenLoop,
-    bisected,
     continuous,
     cut,
     one_run,
@@ -176,14 +175,14 @@ def _between_samples(loop: LinearLoop, period: float, near: float) -> Boundary:
     if whole > LONGEST_HISTORY:
         return Boundary(None, f"every delay up to {LONGEST_HISTORY} samples is stable")
 
-    def stable(delay: float) -> bool:
-        return bool(radii(loop, period, delay).max() < 1.0)
+    def excess(delay: float) -> float:
+        return float(radii(loop, period, delay).max()) - 1.0
 
     low = whole * period
     for k in range(1, _PARTS + 1):
         high = (whole + k / _PARTS) * period
-        if not stable(high):
-            value = bisected(stable, low, high)
+        if excess(high) >= 0.0:
+            value = root(excess, np.array([low, high]), 1e-6)
             return Boundary(value, "unstable above", worst_time(loop, radii(loop, period, value)))
         low = high
     return Boundary(low, "unstable above")

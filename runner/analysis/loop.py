@@ -182,7 +182,7 @@ class Points:
 
     def with_control(self, key: str, numbers: Floats) -> Points:
         """Of one run, as many as there are numbers: each for a parameter of the control."""
-        place = [slot.key for slot in self.scenario.system().slots].index(key)
+        place = [slot.key for slot in linearised(self.scenario).system.slots].index(key)
         values = np.repeat(self.values, len(numbers), axis=0)
         values[:, place] = numbers
         names = ("x", "u", "A", "B")
@@ -231,7 +231,7 @@ def _law_gain(scenario: Scenario, values: Floats, x: Floats, reach: Floats) -> F
 
 
 def _believed_mass(scenario: Scenario, values: Floats, x: Floats) -> Floats:
-    system = scenario.system()
+    system = linearised(scenario).system
     place = {slot.key: k for k, slot in enumerate(system.slots)}
     nominal = values.copy()
     for key, k in place.items():
@@ -248,6 +248,7 @@ def _duration(scenario: Scenario) -> float:
     return scenario.step * scenario.steps
 
 
+@lru_cache(maxsize=16)
 def linearised(scenario: Scenario) -> Linearisation:
     """The scenario's loop, linearised symbolically."""
     return linearisation_of(scenario.structure())
@@ -255,7 +256,7 @@ def linearised(scenario: Scenario) -> Linearisation:
 
 def slots_of(scenario: Scenario, key: str) -> list[int]:
     """Places in p of a parameter with one entry per joint."""
-    return [k for k, slot in enumerate(scenario.system().slots) if slot.key.rpartition(".")[0] == key]
+    return [k for k, slot in enumerate(linearised(scenario).system.slots) if slot.key.rpartition(".")[0] == key]
 
 
 def unlimited(scenario: Scenario, values: Floats) -> Floats:
@@ -278,7 +279,7 @@ def signal_values(scenario: Scenario, values: Floats, times: Floats) -> Floats:
     """w at each of the times for each run, (runs, times, entries)."""
     rows = np.tile(_table_rows(scenario, times), (len(values), 1)).T
     (found,) = over_runs(
-        scenario.system().function("signals"), np.tile(times, len(values))[None, :], rows, _repeated(values, len(times))
+        linearised(scenario).system.function("signals"), np.tile(times, len(values))[None, :], rows, _repeated(values, len(times))
     )
     return found[:, :, 0].reshape(len(values), len(times), -1)
 
@@ -302,11 +303,11 @@ def _table_rows(scenario: Scenario, times: Floats) -> Floats:
 
 def _operating_points(scenario: Scenario, values: Floats, times: Floats) -> tuple[Floats, Floats, dict[str, Floats]]:
     """x and u that keep the arm on its reference, and the plant's matrices there."""
-    n, runs, count = scenario.system().n, len(values), len(times)
+    n, runs, count = linearised(scenario).system.n, len(values), len(times)
     function = linearised(scenario).plant
     w = signal_values(scenario, values, times)
     q, dq, ddq = (w[..., k * n : (k + 1) * n] for k in range(3))
-    elastic = scenario.structure().drive == "elastic"
+    elastic = linearised(scenario).system.structure.drive == "elastic"
     x = np.concatenate([q, dq, q, dq] if elastic else [q, dq], axis=-1)
     u = np.zeros((runs, count, n))
 
@@ -331,7 +332,7 @@ def _operating_points(scenario: Scenario, values: Floats, times: Floats) -> tupl
 
 def _states_of_control(scenario: Scenario, values: Floats, times: Floats, x: Floats, u: Floats) -> Floats:
     """z with which the controller commands what carries the arm, as near to its start as may be; else its start."""
-    start = np.array(scenario.system().z_start)[: linearised(scenario).own_states]
+    start = np.array(linearised(scenario).system.z_start)[: linearised(scenario).own_states]
     z = np.tile(start, (*x.shape[:2], 1))
     for _ in range(3 if start.size else 0):
         found = _control(Points(scenario, times, values, x, u, z, x, u), None, 0.0)
@@ -377,7 +378,7 @@ def _control(points: Points, amplitude: Floats | None, period: float) -> dict[st
     linear = linearised(scenario)
     held = linear.held if period > 0.0 else None
     function = held or linear.control
-    runs, count, n = len(points.values), len(points.times), scenario.system().n
+    runs, count, n = len(points.values), len(points.times), linearised(scenario).system.n
     w = signal_values(scenario, points.values, points.times)
     number = runs * count
     p = _repeated(points.values, count)
@@ -394,7 +395,7 @@ def _control(points: Points, amplitude: Floats | None, period: float) -> dict[st
         gains = [np.zeros((runs, count, found[name].shape[-2], n)) for name in ("u", "dz", "ahead")]
     else:
         sizes = _repeated(np.broadcast_to(amplitude, (runs, n)), count)
-        gains = apart(over_runs(_swept(scenario.structure(), held is not None), *before, sizes, *after))
+        gains = apart(over_runs(_swept(linear.system.structure, held is not None), *before, sizes, *after))
     for name, gain in zip(("u", "dz", "ahead"), gains, strict=True):
         found[f"{name}_s"] = gain
         for by in ("x", "z") if linear.cut else ():
@@ -404,7 +405,7 @@ def _control(points: Points, amplitude: Floats | None, period: float) -> dict[st
 
 def _remembered(points: Points, period: float) -> Floats:
     """z whole: behind the controller's own states, each position a sample before, and the rate that it made of them."""
-    more = points.scenario.system().z.numel() - points.z.shape[-1]
+    more = linearised(points.scenario).system.z.numel() - points.z.shape[-1]
     if not more:
         return points.z
     n = points.u.shape[-1]

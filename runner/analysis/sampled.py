@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from springline.runner.analysis.continuous import growth, spectrum
-from springline.runner.analysis.loop import Boundary, LinearLoop, joined
+from springline.runner.analysis.loop import Boundary, LinearLoop, joined, linearised
+from springline.runner.analysis.roots import root
 
 Floats = NDArray[np.float64]
 
@@ -128,7 +128,7 @@ def period_of(loop: LinearLoop) -> float | None:
 
 def delay_of(loop: LinearLoop) -> float:
     """Delay of the loop's scenario, s."""
-    return float(loop.scenario.step * loop.scenario.structure().delay)
+    return float(loop.scenario.step * linearised(loop.scenario).system.structure.delay)
 
 
 def cut(loop: LinearLoop) -> OpenLoop:
@@ -189,30 +189,22 @@ def _period_max(loop: LinearLoop) -> Boundary:
     period = given or 0.1 / fastest
     least, most = max(1e-3 / fastest, delay / LONGEST_HISTORY), 1e3 * max(period, 1 / fastest)
 
-    def stable(at: float) -> bool:
-        return bool(radii(loop, at, delay).max() < 1.0)
+    def excess(at: float) -> float:
+        return float(radii(loop, at, delay).max()) - 1.0
 
-    if stable(period):
-        while stable(period * _GROWTH):
+    if excess(period) < 0.0:
+        while excess(period * _GROWTH) < 0.0:
             period *= _GROWTH
             if period > most:
                 return Boundary(None, f"every period up to {most:.3g} s is stable")
     else:
-        while period > least and not stable(period / _GROWTH):
+        while period > least and excess(period / _GROWTH) >= 0.0:
             period /= _GROWTH
         if period <= least:
             return Boundary(None, f"no period down to {least:.3g} s is stable")
         period /= _GROWTH
-    value = bisected(stable, period, period * _GROWTH)
+    value = root(excess, np.array([period, period * _GROWTH]), 1e-6)
     return Boundary(value, "unstable above", worst_time(loop, radii(loop, value, delay)))
-
-
-def bisected(stable: Callable[[float], bool], low: float, high: float) -> float:
-    """Where `stable`, which holds of low and not of high, ceases to, to a part in 1e6."""
-    while high - low > 1e-6 * high:
-        middle = (low + high) / 2
-        low, high = (middle, high) if stable(middle) else (low, middle)
-    return (low + high) / 2
 
 
 def worst_time(loop: LinearLoop, of: Floats) -> float:

@@ -45,7 +45,6 @@ def analyze(
     each. With -o a report with figures. An unstable design is a result too, and the exit code is 0.
     """
     from springline.runner.analysis import analyze as examine
-    from springline.runner.analysis import write_report
     from springline.runner.scenario import load_scenario
 
     loaded = load_scenario(scenario, overrides(changes, scenario))
@@ -55,7 +54,11 @@ def analyze(
         refuse_results(output)
     with progress(f"analysing {scenario}", quiet=as_json) as report:
         found = examine(loaded, between, confirm=confirm, damping=damping, progress=report)
-    written = None if output is None else write_report(found, output, force=force)
+    written = None
+    if output is not None:  # its figures take a second to load
+        from springline.runner.analysis import write_report
+
+        written = write_report(found, output, force=force)
     for note in (*loaded.notes, *loaded.warnings):
         complain(note)
     if as_json:
