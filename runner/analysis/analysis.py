@@ -161,6 +161,7 @@ class _Work:
         self.sampled = scenario.control_every > 0
         self.period = scenario.control_every * scenario.step
         self.delay = scenario.structure().delay * scenario.step
+        self.at: dict[str, float | None] = {}  # where along the reference a boundary was found
 
     @cached_property
     def loop(self) -> LinearLoop:
@@ -300,6 +301,7 @@ def _delta(work: _Work) -> list[Row]:
     keys = work.scenario.numeric_keys()
     unit = keys[key].unit if key in keys else "1"
     boundary = delta_critical(work.scenario, work.amplitude)[0]
+    work.at[name] = boundary.at
     others = [delta_critical(work.scenario, amplitude)[0] for amplitude in AMPLITUDES] if boundary.value else []
     given = float(work.scenario.value_of(key)) if key in keys else math.nan  # type: ignore[arg-type] # a number
     if work.unbounded and boundary.value is not None:
@@ -330,6 +332,7 @@ def _time_limit(
     """period_max and delay_max. words: what the given one is called, what holds without one, and what to do."""
     called, without, remedy = words
     boundary = finder(work.loop)[0]
+    work.at[name] = boundary.at
     if work.unbounded and boundary.value is not None:
         text = f"no finite boundary: {work.unbounded}; however fast it is, it ends in a limit cycle"
         return [Row(name, None, "s", False if work.unstable else None, text + _cycle_text(work))]
@@ -576,7 +579,7 @@ def _confirmed(work: _Work, rows: Sequence[Row], report: Callable[[float], None]
     found = list(rows)
     for k, row in enumerate(rows):
         if row.value is not None and row.name in finders:
-            value, how = finders[row.name](by_runs.bench(work.loop, work.amplitude), row.value)
+            value, how = finders[row.name](by_runs.bench(work.loop, work.amplitude, work.at.get(row.name)), row.value)
             found[k] = _beside(row, value, how)
         report((k + 1) / len(rows))
     if work.cycle is None or work.cycle.amplitude is None:

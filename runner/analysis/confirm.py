@@ -18,6 +18,7 @@ from springline.codegen.kernel import ONE_RUN, KernelSpec, LoopSettings, kernel
 from springline.model.hardware import LONGEST_DELAY
 from springline.model.structure import Structure
 from springline.runner.analysis.loop import LinearLoop
+from springline.runner.analysis.sampled import cut
 from springline.runner.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -35,6 +36,12 @@ _SHARES = ((0.35, 0.5), (0.85, 1.0))
 _FINE = 100  # steps of a delay, and of a period beside one
 _SAMPLE_STEPS = 20  # of a period by itself
 _NOTHING = 1e-9  # of the amplitude: rounding
+_ROUGH = (
+    ("sensor", "position_noise", 0.0),
+    ("sensor", "velocity_noise", 0.0),
+    ("sensor", "position_resolution", 0.0),
+    ("actuator", "rate_limit", float("inf")),
+)  # effects that are nothing in the small, or drown it, and without which there are none
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +115,9 @@ class Bench:
         if "limits" in given.document["mechanism"]:
             changes["mechanism.limits"] = [[-float("inf"), float("inf")]] * len(joints)
         silent = given.with_overrides(changes)
-        for table, quiet in (("sensor", 0.0), ("actuator", float("inf"))):
-            names = (
-                ("position_noise", "velocity_noise", "position_resolution") if table == "sensor" else ("rate_limit",)
-            )
-            silent = silent.with_overrides({f"{table}.{name}": [quiet] * len(joints) for name in names})
+        for table, name, quiet in _ROUGH:
+            if name in given.document[table]:
+                silent = silent.with_overrides({f"{table}.{name}": [quiet] * len(joints)})
         return silent.with_overrides(self._start(silent))
 
     def _start(self, scenario: Scenario) -> dict[str, object]:
@@ -169,11 +174,14 @@ class Bench:
         ]
 
 
-def bench(loop: LinearLoop, amplitude: float) -> Bench:
-    """Where the loop's runs are held: at the time along the reference where the continuous loop is the least stable."""
+def bench(loop: LinearLoop, amplitude: float, at: float | None = None) -> Bench:
+    """Where the loop's runs are held: at a time along the reference, or where the loop is the least stable."""
     scenario, n, nx = loop.scenario, loop.n, loop.A.shape[-1]
-    values, vectors = np.linalg.eig(loop.closed()[0])
-    time = int(np.argmax(values.real.max(axis=-1)))
+    opened = cut(loop)
+    values, vectors = (item.astype(complex) for item in np.linalg.eig(opened.closed[0]))
+    if opened.period is not None:
+        values = np.log(np.where(np.abs(values) > 0.0, values, 1e-300)) / opened.period
+    time = int(np.argmax(values.real.max(axis=-1)) if at is None else np.argmin(np.abs(loop.times - at)))
     values, vectors = values[time], vectors[time, :nx]
     turning = values.imag > 1e-6 * np.abs(values)
     chosen = turning if turning.any() else values.imag >= 0.0
