@@ -571,20 +571,22 @@ def _floquet(work: _Work) -> list[Row]:
 
 def _confirmed(work: _Work, rows: Sequence[Row], report: Callable[[float], None]) -> list[Row]:
     """The rows with what runs found; boundaries and limit cycles alone can be found again by runs."""
-    finders: dict[str, Callable[[by_runs.Bench, float], tuple[float | None, str]]] = {
-        "delta_critical": lambda bench, value: by_runs.confirmed_number(bench, "control.delta", value),
+    finders: dict[str, Callable[[LinearLoop, float], tuple[float | None, str]]] = {
+        "delta_critical": by_runs.confirmed_layer,
         "period_max": by_runs.confirmed_period,
         "delay_max": by_runs.confirmed_delay,
     }
     found = list(rows)
     for k, row in enumerate(rows):
         if row.value is not None and row.name in finders:
-            value, how = finders[row.name](by_runs.bench(work.loop, work.amplitude, work.at.get(row.name)), row.value)
+            loop = linear_loop(work.scenario, work.amplitude, times=[work.at[row.name]])
+            value, how = finders[row.name](loop, row.value)
             found[k] = _beside(row, value, how)
         report((k + 1) / len(rows))
     if work.cycle is None or work.cycle.amplitude is None:
         return found
-    sizes, frequency, how = by_runs.confirmed_cycle(by_runs.bench(work.loop, float(work.cycle.amplitude.max())))
+    at = linear_loop(work.scenario, work.cycle.amplitude, times=[work.cycle.at])
+    sizes, frequency, how = by_runs.confirmed_cycle(at)
     seen = {f"limit_cycle_amplitude_{joint.name}": size for joint, size in zip(work.joints, sizes, strict=True)}
     seen |= {"limit_cycle_amplitude": sizes.max(), "limit_cycle_frequency": frequency}
     return [

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from springline.codegen.kernel import ONE_RUN, KernelSpec, LoopSettings, kernel
 from springline.model.hardware import LONGEST_DELAY
 from springline.model.structure import Structure
-from springline.runner.analysis.loop import LinearLoop
-from springline.runner.analysis.sampled import cut
+from springline.runner.analysis.loop import LinearLoop, points_of
+from springline.runner.analysis.sampled import OpenLoop, cut, delay_of, period_of, sampled
 from springline.runner.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -30,10 +30,11 @@ _RESOLUTION = 0.01
 _SPREAD = 1.35  # of the first candidates about what is expected, either way
 _WIDENED = 3
 _FEWEST_PERIODS, _PERIODS = 20.0, 150.0  # of the critical oscillation, in a run
-_DECAYS = 8.0  # times over that it would die out meanwhile, as the scenario stands
+_DECAYS = 8.0  # times over that all else dies out meanwhile
 _STEPS = 45.0  # a radian of the fastest oscillation takes so many steps / (2 pi) at least
 _SHARES = ((0.35, 0.5), (0.85, 1.0))
 _FINE = 100  # steps of a delay, and of a period beside one
+_COARSE = 30  # samples of a delay, where oscillations at a continuous loop's boundary are told
 _SAMPLE_STEPS = 20  # of a period by itself
 _NOTHING = 1e-9  # of the amplitude: rounding
 _ROUGH = (
@@ -174,24 +175,29 @@ class Bench:
         ]
 
 
-def bench(loop: LinearLoop, amplitude: float, at: float | None = None) -> Bench:
-    """Where the loop's runs are held: at a time along the reference, or where the loop is the least stable."""
-    scenario, n, nx = loop.scenario, loop.n, loop.A.shape[-1]
-    opened = cut(loop)
-    values, vectors = (item.astype(complex) for item in np.linalg.eig(opened.closed[0]))
+def bench_of(loop: LinearLoop, opened: OpenLoop) -> Bench:
+    """Where the runs of a loop are held: at its one time along the reference, with what oscillates at its boundary.
+
+    opened  the loop at its boundary, where one of its oscillations neither grows nor dies out
+    """
+    n, nx = loop.n, loop.A.shape[-1]
+    values, vectors = (item.astype(complex) for item in np.linalg.eig(opened.closed[0, 0]))
     if opened.period is not None:
         values = np.log(np.where(np.abs(values) > 0.0, values, 1e-300)) / opened.period
-    time = int(np.argmax(values.real.max(axis=-1)) if at is None else np.argmin(np.abs(loop.times - at)))
-    values, vectors = values[time], vectors[time, :nx]
+    vectors = vectors[:nx]
     turning = values.imag > 1e-6 * np.abs(values)
     chosen = turning if turning.any() else values.imag >= 0.0
-    chosen &= np.abs(vectors[n : 2 * n]).max(axis=0) > 1e-9
-    critical = values[int(np.argmax(np.where(chosen, values.real, -np.inf)))]
-    turn = 2 * np.pi / max(abs(critical), 1e-3)
-    calm = max(abs(critical.real), 1e-9)
+    chosen = chosen & (np.abs(vectors[n : 2 * n]).max(axis=0) > 1e-9)
+    chosen = np.flatnonzero(chosen)  # the least damped ones, one for each spring: a delay has more of its own
+    chosen = chosen[np.argsort(-values.real[chosen])][:n]
+    critical = int(chosen[0])
+    turn = 2 * np.pi / max(abs(values[critical]), 1e-3)
+    others = np.abs(values.real[np.abs(values.imag) != abs(values[critical].imag)])
+    calm = max(float(others.min(initial=np.inf)), 1e-9)
     duration = min(max(_FEWEST_PERIODS * turn, _DECAYS / calm), _PERIODS * turn)
-    moving = np.abs(values[chosen])
-    return Bench(scenario, loop.x[0, time, :n].copy(), amplitude, duration, float(moving.max()), vectors[:, chosen])
+    fastest = float(np.abs(values[chosen]).max())
+    amplitude = float(np.max(loop.amplitude))
+    return Bench(loop.scenario, loop.x[0, 0, :n].copy(), amplitude, duration, fastest, vectors[:, chosen])
 
 
 def _plant(scenario: Scenario, name: str, joint: int) -> float:
@@ -235,9 +241,13 @@ def bisected(grows: Callable[[Floats], Sequence[bool]], expected: float, *, abov
     return None, runs
 
 
-def confirmed_number(bench: Bench, key: str, expected: float) -> tuple[float | None, str]:
-    """The smallest value of a numeric key (delta) that lets a disturbance die out, and how it was found."""
-    scenario, held = bench.scenario, bench.held
+def confirmed_layer(loop: LinearLoop, expected: float) -> tuple[float | None, str]:
+    """The smallest delta that lets a disturbance die out, and how it was found; loop: at one time, as all below."""
+    scenario = loop.scenario
+    key = "control.delta"
+    edge = points_of(scenario, times=loop.times).with_control(key, np.array([expected]))
+    bench = bench_of(loop, cut(edge.loop(loop.amplitude)))
+    held = bench.held
     delay = scenario.structure().delay
     step, hold = bench.step, 0
     if scenario.control_every:
@@ -253,9 +263,10 @@ def confirmed_number(bench: Bench, key: str, expected: float) -> tuple[float | N
     return value, _how(runs, bench, step)
 
 
-def confirmed_period(bench: Bench, expected: float) -> tuple[float | None, str]:
+def confirmed_period(loop: LinearLoop, expected: float) -> tuple[float | None, str]:
     """The longest sample period, s, at which it dies out: with the scenario's own delay, none if that has none."""
-    scenario, held = bench.scenario, bench.held
+    scenario, bench = loop.scenario, bench_of(loop, sampled(loop, expected, delay_of(loop)))
+    held = bench.held
     values = held.values()[None, :]
     delay = scenario.structure().delay * scenario.step
     steps = min(max(round(delay / (expected / _FINE)), 1), LONGEST_DELAY) if delay else 0
@@ -276,9 +287,10 @@ def confirmed_period(bench: Bench, expected: float) -> tuple[float | None, str]:
     return value, _how(runs, bench, finest[0])
 
 
-def confirmed_delay(bench: Bench, expected: float) -> tuple[float | None, str]:
+def confirmed_delay(loop: LinearLoop, expected: float) -> tuple[float | None, str]:
     """The longest delay, s, at which it dies out: at the scenario's period, or of a control at every step."""
-    scenario, held = bench.scenario, bench.held
+    scenario, bench = loop.scenario, bench_of(loop, sampled(loop, period_of(loop) or expected / _COARSE, expected))
+    held = bench.held
     values = held.values()[None, :]
     period = scenario.control_every * scenario.step
     steps = min(max(_FINE, round(_FINE * expected / period)), LONGEST_DELAY) if period else _FINE
@@ -298,10 +310,12 @@ def confirmed_delay(bench: Bench, expected: float) -> tuple[float | None, str]:
     return value, _how(runs, bench, finest[0])
 
 
-def confirmed_cycle(bench: Bench) -> tuple[Floats, float, str]:
+def confirmed_cycle(loop: LinearLoop) -> tuple[Floats, float, str]:
     """Amplitude of sigma per joint, and frequency (rad/s), of what a run ends in, and how they were found."""
-    scenario, held = bench.scenario, bench.held
+    scenario, bench = loop.scenario, bench_of(loop, cut(loop))
+    held = bench.held
     step = scenario.step if scenario.control_every else bench.step
+    bench = replace(bench, duration=_PERIODS / _FEWEST_PERIODS * bench.duration)  # to where it neither grows nor shrinks
     structure = replace(held.structure(), delay=scenario.structure().delay)
     [run] = bench.runs(held.values()[None, :], structure, step, scenario.control_every)
     if not run.complete:

@@ -185,7 +185,7 @@ def _between_samples(loop: LinearLoop, period: float, near: float) -> Boundary:
             value = root(excess, np.array([low, high]), 1e-6)
             return Boundary(value, "unstable above", worst_time(loop, radii(loop, period, value)))
         low = high
-    return Boundary(low, "unstable above")
+    return Boundary(low, "unstable above", worst_time(loop, radii(loop, period, low)))
 
 
 def margins(loop: LinearLoop) -> tuple[Margins, ...]:
