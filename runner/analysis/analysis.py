@@ -245,6 +245,13 @@ class _Work:
         ]
         if not self.gained:
             found = ["Boundaries hold about points of the reference taken one by one; that is no proof for the motion."]
+        if self.scenario.structure().differenced:
+            found.append(
+                "Rates are made of differences: boundaries and margins are of that loop, sampled; time scales, fast "
+                "damping and the Floquet exponent are of rates as they are."
+            )
+        if self.scenario.structure().effects:
+            found.append("Noise, resolution and rate limits of sensors and motors are no part of it either.")
         limits = limits_from(self.scenario)
         size = "" if limits.value is None else f" (|sigma| from {limits.value:.3g} on)"
         found.append(f"Limits of law and motors are no part of it: {limits.reason}{size}.")
@@ -582,6 +589,8 @@ def _confirmed(work: _Work, rows: Sequence[Row], report: Callable[[float], None]
             loop = linear_loop(work.scenario, work.amplitude, times=[work.at[row.name]])
             value, how = finders[row.name](loop, row.value)
             found[k] = _beside(row, value, how)
+            if value is not None and _disagree(row.value, value):
+                found[k] = replace(found[k], text=found[k].text + _at_rest(row.name, loop, value))
         report((k + 1) / len(rows))
     if work.cycle is None or work.cycle.amplitude is None:
         return found
@@ -589,10 +598,33 @@ def _confirmed(work: _Work, rows: Sequence[Row], report: Callable[[float], None]
     sizes, frequency, how = by_runs.confirmed_cycle(at)
     seen = {f"limit_cycle_amplitude_{joint.name}": size for joint, size in zip(work.joints, sizes, strict=True)}
     seen |= {"limit_cycle_amplitude": sizes.max(), "limit_cycle_frequency": frequency}
-    return [
-        _beside(row, None if math.isnan(seen[row.name]) else float(seen[row.name]), how) if row.name in seen else row
-        for row in found
-    ]
+    for k, row in enumerate(rows):
+        if row.name not in seen:
+            continue
+        value = None if math.isnan(seen[row.name]) else float(seen[row.name])
+        found[k] = _beside(row, value, how)
+        if value is not None and row.value is not None and _disagree(row.value, value):
+            swing = float(work.cycle.amplitude.max()) / float(work.cycle.frequency or 1.0)
+            why = f" Only sigma's law is taken for bent: e swings by {swing:.2g} there, over which a surface bends too."
+            found[k] = replace(found[k], text=found[k].text + why)
+    return found
+
+
+def _disagree(value: float, runs: float) -> bool:
+    return abs(runs / value - 1) > DISAGREE
+
+
+def _at_rest(name: str, loop: LinearLoop, runs: float) -> str:
+    """Whether a boundary and its runs are apart because these stand still, as a sentence; "" where that is not why."""
+    held = by_runs.at_rest(loop)
+    if name == "delta_critical":
+        (still,) = delta_critical(held, loop.amplitude, times=[0.0])
+    else:
+        finder = period_max if name == "period_max" else delay_max
+        (still,) = finder(linear_loop(held, loop.amplitude, times=[0.0]))
+    if still.value is None or _disagree(still.value, runs):
+        return ""
+    return f" Runs stand still where the reference moves on; of a loop at rest it is {still.value:.3g}."
 
 
 def _beside(row: Row, value: float | None, how: str) -> Row:
@@ -601,6 +633,6 @@ def _beside(row: Row, value: float | None, how: str) -> Row:
         return replace(row, text=f"{row.text} Runs do not confirm it: none of them found a boundary near it ({how}).")
     off = value / row.value - 1
     said = f"Runs: {_number(value, row.unit)} ({how})"
-    if abs(off) > DISAGREE:
+    if _disagree(row.value, value):
         said = f"Runs disagree by {off:+.0%}: {_number(value, row.unit)} ({how})"
     return replace(row, confirmed=value, text=f"{row.text.rstrip('.')}. {said}.")

@@ -1,6 +1,6 @@
 """Boundaries found again by runs: does a small disturbance of the loop grow, or does it die out?
 
-A run is held at one point of the reference, with the base at rest, and starts with every oscillation of the loop at the
+A run is held at one point of the reference, with the base at rest and motors that give what they are asked for, and starts with every oscillation of the loop at the
 amplitude that its boundary was computed for. What grows is told from the size of the joints' rates in the middle of the
 run and at its end. Candidates are simulated together, and the boundary lies between two of them that differ.
 """
@@ -36,7 +36,7 @@ _SHARES = ((0.35, 0.5), (0.85, 1.0))
 _FINE = 100  # steps of a delay, and of a period beside one
 _COARSE = 30  # samples of a delay, where oscillations at a continuous loop's boundary are told
 _SAMPLE_STEPS = 20  # of a period by itself
-_NOTHING = 1e-9  # of the amplitude: rounding
+_NOTHING = 1e-6  # of the amplitude: what falls below has died out, and goes on in rounding
 _ROUGH = (
     ("sensor", "position_noise", 0.0),
     ("sensor", "velocity_noise", 0.0),
@@ -115,6 +115,7 @@ class Bench:
         changes["disturbance.kind"] = "none"
         if "limits" in given.document["mechanism"]:
             changes["mechanism.limits"] = [[-float("inf"), float("inf")]] * len(joints)
+        changes["control.U_max"] = [float("inf")] * len(joints)
         silent = given.with_overrides(changes)
         for table, name, quiet in _ROUGH:
             if name in given.document[table]:
@@ -198,6 +199,11 @@ def bench_of(loop: LinearLoop, opened: OpenLoop) -> Bench:
     fastest = float(np.abs(values[chosen]).max())
     amplitude = float(np.max(loop.amplitude))
     return Bench(loop.scenario, loop.x[0, 0, :n].copy(), amplitude, duration, fastest, vectors[:, chosen])
+
+
+def at_rest(loop: LinearLoop) -> Scenario:
+    """The loop's scenario as its runs are held: standing still at its one time along the reference."""
+    return bench_of(loop, cut(loop)).held
 
 
 def _plant(scenario: Scenario, name: str, joint: int) -> float:

@@ -14,7 +14,7 @@ from springline.runner.analysis.analysis import Analysis
 from springline.runner.analysis.continuous import growth
 from springline.runner.analysis.loop import linear_loop
 from springline.runner.analysis.reaching import AMPLITUDES, LawCurves
-from springline.runner.analysis.sampled import cut
+from springline.runner.analysis.sampled import cut, rates_of
 from springline.runner.analysis.sensitivity import Sensitivities
 from springline.runner.report import COLUMN, LINES, PAGE, label, legend_above, panels
 
@@ -84,7 +84,7 @@ def channels(found: Analysis) -> Figure:
     """The loop's response cut at each motor's channel: its size, and its phase beyond the critical one."""
     loop, opened = found.loop, cut(found.loop)
     joints = found.scenario.system().joints
-    time = int(np.argmax(np.abs(np.linalg.eigvals(opened.closed[0])).max(axis=-1)))
+    time = int(rates_of(loop)[0].argmax())
     f, g, c = (np.asarray(item[0, time]) for item in (opened.F, opened.G, opened.C))
     poles = np.linalg.eigvals(f + g @ c).astype(complex)
     if opened.period is not None:
