@@ -232,7 +232,7 @@ class _Work:
             return None, f"the run does not last, so that no disturbance can be told ({result.message})"
         # Arrow's own to_numpy imports pandas where that is installed.
         columns = {
-            name: np.from_dlpack(column.chunk(0))
+            name: np.asarray(np.from_dlpack(column.chunk(0)), dtype=np.float64)
             for name, column in zip(result.trajectory.column_names, result.trajectory.columns, strict=True)
         }
         return proof_of(self.scenario, columns), ""
@@ -586,7 +586,7 @@ def _confirmed(work: _Work, rows: Sequence[Row], report: Callable[[float], None]
     found = list(rows)
     for k, row in enumerate(rows):
         if row.value is not None and row.name in finders:
-            loop = linear_loop(work.scenario, work.amplitude, times=[work.at[row.name]])
+            loop = linear_loop(work.scenario, work.amplitude, times=work.at[row.name])
             value, how = finders[row.name](loop, row.value)
             found[k] = _beside(row, value, how)
             if value is not None and _disagree(row.value, value):
@@ -594,7 +594,7 @@ def _confirmed(work: _Work, rows: Sequence[Row], report: Callable[[float], None]
         report((k + 1) / len(rows))
     if work.cycle is None or work.cycle.amplitude is None:
         return found
-    at = linear_loop(work.scenario, work.cycle.amplitude, times=[work.cycle.at])
+    at = linear_loop(work.scenario, work.cycle.amplitude, times=work.cycle.at)
     sizes, frequency, how = by_runs.confirmed_cycle(at)
     seen = {f"limit_cycle_amplitude_{joint.name}": size for joint, size in zip(work.joints, sizes, strict=True)}
     seen |= {"limit_cycle_amplitude": sizes.max(), "limit_cycle_frequency": frequency}

@@ -1,8 +1,9 @@
 """Boundaries found again by runs: does a small disturbance of the loop grow, or does it die out?
 
-A run is held at one point of the reference, with the base at rest and motors that give what they are asked for, and starts with every oscillation of the loop at the
-amplitude that its boundary was computed for. What grows is told from the size of the joints' rates in the middle of the
-run and at its end. Candidates are simulated together, and the boundary lies between two of them that differ.
+A run is held at one point of the reference, with the base at rest and motors that give what they are asked for. It
+starts with the springs' oscillations as they are at the boundary, at the amplitude that this was computed for. What
+grows is told from the size of the joints' rates in the middle of the run and at its end. Candidates are simulated
+together, and the boundary lies between two of them that differ.
 """
 
 from __future__ import annotations
@@ -321,7 +322,7 @@ def confirmed_cycle(loop: LinearLoop) -> tuple[Floats, float, str]:
     scenario, bench = loop.scenario, bench_of(loop, cut(loop))
     held = bench.held
     step = scenario.step if scenario.control_every else bench.step
-    bench = replace(bench, duration=_PERIODS / _FEWEST_PERIODS * bench.duration)  # to where it neither grows nor shrinks
+    bench = replace(bench, duration=_PERIODS / _FEWEST_PERIODS * bench.duration)  # until it changes no more
     structure = replace(held.structure(), delay=scenario.structure().delay)
     [run] = bench.runs(held.values()[None, :], structure, step, scenario.control_every)
     if not run.complete:

@@ -87,7 +87,7 @@ class _Response:
 
     def _frequencies(self, poles: Complex) -> Floats:
         if self.period is not None:
-            poles = np.log(np.where(np.abs(poles) > 0.0, poles, 1e-300)) / self.period
+            poles = np.asarray(np.log(np.where(np.abs(poles) > 0.0, poles, 1e-300)) / self.period, dtype=np.complex128)
             highest = np.pi / self.period
         else:
             highest = 1e3 * max(float(np.abs(poles).max()), 1.0)
@@ -102,9 +102,7 @@ class _Response:
         return inside
 
 
-def _roots(
-    f: Callable[[Floats, Places], Floats], grid: Floats, at: Places, values: Floats
-) -> tuple[Floats, Places]:
+def _roots(f: Callable[[Floats, Places], Floats], grid: Floats, at: Places, values: Floats) -> tuple[Floats, Places]:
     """Where f, of frequencies and points, changes its sign between neighbours of a grid, at which it has `values`."""
     changes = np.flatnonzero((np.signbit(values[1:]) != np.signbit(values[:-1])) & (at[1:] == at[:-1]))
     places = at[changes]
@@ -132,7 +130,7 @@ def _least_delay(response: _Response) -> tuple[float, float, int]:
         found, places = _roots(excess, grid, at, tables[:, k])
         if not found.size:
             continue
-        values = np.linalg.eigvals(response(found, places))
+        values = np.asarray(np.linalg.eigvals(response(found, places)), dtype=np.complex128)
         turned = np.take_along_axis(values, np.argsort(np.abs(values), axis=-1), axis=-1)[:, k]
         delays = _lags(turned, found)
         least = int(delays.argmin())
@@ -228,7 +226,7 @@ def _channel(opened: OpenLoop, times: Floats, joint: int) -> tuple[float, ...]:
     crossed, places = _roots(excess, grid, at, np.abs(values) - 1.0)
     if not crossed.size:
         return up[0], down[0], nearest[0], nearest[1], np.inf, np.nan, np.inf, np.nan, nearest[2]
-    turned = response(crossed, places)[:, 0, 0]
+    turned: Complex = response(crossed, places)[:, 0, 0]
     angles, delays = np.abs(np.angle(turned)), _lags(turned, crossed)
     k, late = int(angles.argmin()), int(delays.argmin())
     phase, delay = (float(angles[k]), float(crossed[k])), (float(delays[late]), float(crossed[late]))

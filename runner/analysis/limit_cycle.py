@@ -50,7 +50,8 @@ def limit_cycle(scenario: Scenario, *, times: ArrayLike | None = None) -> LimitC
 
     It is where the loop, unstable for smaller amplitudes of sigma and stable for larger ones, is neither: the first
     such amplitude between 1e-6 and 10, all joints in the ratio of the critical mode, at the time along the reference
-    where it is largest. Where the loop is stable in the small, only what starts above that reaches it, and the reason says so.
+    where it is largest. Where the loop is stable in the small, only what starts above that reaches it, and the reason
+    says so.
     """
     if not linearised(scenario).cut:
         return LimitCycle(None, None, None, "the controller has no sliding variable, and so no gain by amplitude")

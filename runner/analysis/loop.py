@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as ca
@@ -110,7 +110,7 @@ class LinearLoop:
         return joined(a + b @ cx, b @ self.Cz, dx, self.Dz)
 
     def held(self, period: float) -> tuple[Floats, Floats, Floats, Floats]:
-        """Cx, Cz and Ex, Ez of the control with samples of `period` s: u = Cx x + Cz z, a sample later z' = Ex x + Ez z.
+        """Cx, Cz, Ex, Ez of the control with samples of `period` s: u = Cx x + Cz z, and z' = Ex x + Ez z at the next.
 
         Of rates that are made of differences, z has what they are made of behind the controller's own states.
         """
@@ -185,26 +185,28 @@ class Points:
         place = [slot.key for slot in linearised(self.scenario).system.slots].index(key)
         values = np.repeat(self.values, len(numbers), axis=0)
         values[:, place] = numbers
-        names = ("x", "u", "A", "B")
-        x, u, a, b = (np.repeat(getattr(self, name), len(numbers), axis=0) for name in names)
+        x, u, a, b = (np.repeat(item, len(numbers), axis=0) for item in (self.x, self.u, self.A, self.B))
         z = _states_of_control(self.scenario, values, self.times, x, u)
         return Points(self.scenario, self.times, values, x, u, z, a, b)
 
     def repeated(self, runs: int) -> Points:
         """Of one run, as many alike."""
-        names = ("values", "x", "u", "z", "A", "B")
-        return replace(self, **{name: np.repeat(getattr(self, name), runs, axis=0) for name in names})
+        values, x, u, z, a, b = (np.repeat(item, runs, axis=0) for item in self._arrays)
+        return Points(self.scenario, self.times, values, x, u, z, a, b)
 
     def at_time(self, place: int) -> Points:
         """At one of the times."""
-        names = ("x", "u", "z", "A", "B")
-        few = {name: getattr(self, name)[:, place : place + 1] for name in names}
-        return replace(self, times=self.times[place : place + 1], **few)
+        x, u, z, a, b = (item[:, place : place + 1] for item in self._arrays[1:])
+        return Points(self.scenario, self.times[place : place + 1], self.values, x, u, z, a, b)
 
     def of_run(self, run: int) -> Points:
         """One of the runs."""
-        names = ("values", "x", "u", "z", "A", "B")
-        return replace(self, **{name: getattr(self, name)[run : run + 1] for name in names})
+        values, x, u, z, a, b = (item[run : run + 1] for item in self._arrays)
+        return Points(self.scenario, self.times, values, x, u, z, a, b)
+
+    @property
+    def _arrays(self) -> tuple[Floats, ...]:
+        return self.values, self.x, self.u, self.z, self.A, self.B
 
 
 def points_of(
@@ -278,9 +280,8 @@ def _repeated(values: Floats, times: int) -> Floats:
 def signal_values(scenario: Scenario, values: Floats, times: Floats) -> Floats:
     """w at each of the times for each run, (runs, times, entries)."""
     rows = np.tile(_table_rows(scenario, times), (len(values), 1)).T
-    (found,) = over_runs(
-        linearised(scenario).system.function("signals"), np.tile(times, len(values))[None, :], rows, _repeated(values, len(times))
-    )
+    function, at = linearised(scenario).system.function("signals"), np.tile(times, len(values))[None, :]
+    (found,) = over_runs(function, at, rows, _repeated(values, len(times)))
     return found[:, :, 0].reshape(len(values), len(times), -1)
 
 

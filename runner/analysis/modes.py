@@ -142,7 +142,7 @@ def _assigned(costs: Floats) -> NDArray[np.intp]:
     ordered = np.sort(nearest, axis=-1)
     contested = (ordered[..., 1:] == ordered[..., :-1]).any(axis=-1)
     if contested.any():
-        from scipy.optimize import linear_sum_assignment  # seldom needed, and half a second to load
+        from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - slow to load, and seldom needed
 
         for place in zip(*np.nonzero(contested), strict=True):
             nearest[place] = linear_sum_assignment(costs[place])[1]

@@ -138,8 +138,9 @@ def proof_of(scenario: Scenario, columns: Mapping[str, Floats]) -> Proof:
     w = signals_along(scenario, t[::every])
     base = np.split(w[3 * n : 3 * n + 3 * system.base.b.numel()], 3)
     p = np.repeat(values[:, None], q.shape[1], axis=1)
-    (pushed,), (mass,) = over_runs(system.function("base_disturbance"), *base, q, dq, p), over_runs(
-        system.function("slow_mass"), q, p
+    (pushed,), (mass,) = (
+        over_runs(system.function("base_disturbance"), *base, q, dq, p),
+        over_runs(system.function("slow_mass"), q, p),
     )
     felt = theory.felt_acceleration(mass, pushed[:, :, 0].T)
     margin = theory.margin(felt, number["control.k1"])

@@ -33,16 +33,20 @@ def roots(f: Callable[[Floats], Floats], low: Floats, high: Floats, tolerance: f
         moved = np.abs(new - found)
         found = new
         # Of the four points, the two neighbours that enclose the root.
-        inner, at_inner = np.sort([middle, new], axis=0), np.where(middle <= new, [at_middle, at_new], [at_new, at_middle])
-        for place in range(2):
-            before = np.signbit(at_inner[place]) == np.signbit(at_low)
-            inside = (inner[place] >= low) & (inner[place] <= high)
-            low, at_low = np.where(before & inside, inner[place], low), np.where(before & inside, at_inner[place], at_low)
-        for place in (1, 0):
-            beyond = np.signbit(at_inner[place]) != np.signbit(at_low)
-            inside = (inner[place] >= low) & (inner[place] <= high)
-            high = np.where(beyond & inside, inner[place], high)
-            at_high = np.where(beyond & inside, at_inner[place], at_high)
+        first, second = np.minimum(middle, new), np.maximum(middle, new)
+        swapped = new < middle
+        at_first, at_second = np.where(swapped, at_new, at_middle), np.where(swapped, at_middle, at_new)
+        below = np.signbit(at_low)
+        one, two = np.signbit(at_first) == below, np.signbit(at_second) == below
+        # The change is beyond the second point, between the two, or before the first.
+        high, at_high = (
+            np.where(two, high, np.where(one, second, first)),
+            np.where(two, at_high, np.where(one, at_second, at_first)),
+        )
+        low, at_low = (
+            np.where(two, second, np.where(one, first, low)),
+            np.where(two, at_second, np.where(one, at_first, at_low)),
+        )
         if np.all((moved <= tolerance * np.abs(found)) | (high - low <= tolerance * np.abs(found)) | (at_new == 0.0)):
             break
     return found
