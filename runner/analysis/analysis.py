@@ -510,7 +510,7 @@ def _phase_words(work: _Work, found: Margins, i: int, values: Floats) -> tuple[f
         return None, "rad", True, f"the {joint} motor's channel has a gain below 1 at every frequency"
     how = "slim, " if value < SLIM_PHASE else ""
     frequency = float(found.phase_frequency[i])
-    at = f" at {frequency:.4g} rad/s, {value / frequency:.2g} s of delay there" if frequency > 0 else ""
+    at = f" at {frequency:.4g} rad/s (no measure of delay: that is delay_max)" if frequency > 0 else ""
     text = f"{how}stable until the {joint} motor's channel lags {math.degrees(value):.3g} degrees more{at}"
     return value, "rad", True, text
 

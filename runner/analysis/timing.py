@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from springline.runner.analysis.crossings import delay_max
 from springline.runner.analysis.loop import Boundary, LinearLoop, linear_loop
 from springline.runner.analysis.reaching import AMPLITUDES
 from springline.runner.analysis.sampled import period_max
+from springline.runner.files import InputError
 from springline.runner.scenario import Scenario
 
 _UNBOUNDED = 3.0  # gain at the least amplitude, by that at the scenario's: power laws have 30, bounded ones 1.1
@@ -38,8 +38,18 @@ def unbounded_gain(least: LinearLoop, here: LinearLoop) -> str:
 def timing(scenario: Scenario) -> tuple[str, ...]:
     """Sentences on the largest sample period and the largest delay of a scenario's loop, for those who embed it.
 
-    Nothing is run. Numbers are rounded down to two digits, so that all machines say the same.
+    Nothing is run. Numbers are rounded down to two digits, so that all machines say the same. Of a loop that cannot be
+    linearised they say why.
     """
+    try:
+        return _sentences(scenario)
+    except ValueError as error:
+        problems = error.problems if isinstance(error, InputError) else ()
+        reason = "; ".join(problem.expected for problem in problems) or str(error)
+        return (f"What sample periods and delays the loop bears is not known: {reason}.",)
+
+
+def _sentences(scenario: Scenario) -> tuple[str, ...]:
     amplitude = scenario.sigma_amplitude
     own = linear_loop(scenario, amplitude)
     gained = bool(np.any(own.N != 0.0))
@@ -62,7 +72,7 @@ def timing(scenario: Scenario) -> tuple[str, ...]:
         steps = round(_USUAL / scenario.step)
         if steps and math.isclose(steps * scenario.step, _USUAL):
             sampled = scenario.with_overrides({"control.mode": "sampled", "control.period": steps * scenario.step})
-            held = [replace(loop, scenario=sampled) for loop in loops]
+            held = [linear_loop(sampled, loop.amplitude) for loop in loops]
             found.append(_sentence("delay of the command", f" at a period of {_shown(_USUAL)}", held, delay_max))
     holds = "They are computed for the exported scenario linearised about points of its reference, limits left out"
     if gained:
