@@ -174,10 +174,11 @@ def _strongest(effect: Effect) -> Places:
     """The parameters that move a quantity most, at most _MOST_BARS; what ceases to exist comes first."""
     change = np.abs(np.stack([effect.low, effect.high]) - effect.nominal)
     most = np.where(np.isnan(change), np.inf, change).max(axis=0)
-    order = np.argsort(-most, kind="stable")[:_MOST_BARS]
+    order: Places = np.argsort(-most, kind="stable")[:_MOST_BARS]
     finite = most[np.isfinite(most)]
     least = _VISIBLE * float(finite.max()) if finite.size else 0.0
-    return order[most[order] > least]
+    kept: Places = order[most[order] > least]
+    return kept
 
 
 def _bars(axes: Axes, effect: Effect, order: Places) -> None:
