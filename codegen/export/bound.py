@@ -68,6 +68,7 @@ class Export:
     tables   data of the system's table signals, in the order of System.tables; () leaves them out, they are zero then
     period   s between two commands: what the states of a controller that has some are moved on by
     seed, run  what the noise of sensors goes by
+    timing   sentences on the sample periods and delays that the loop bears, for those who embed it
     """
 
     system: System
@@ -79,6 +80,7 @@ class Export:
     period: float = PERIOD
     seed: int = 0
     run: int = 0
+    timing: tuple[str, ...] = ()
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -150,6 +152,8 @@ class Export:
             identity["period"] = self.period
         if self.system.noise.numel():
             identity |= {"seed": self.seed, "run": self.run}
+        if self.timing:
+            identity["timing"] = self.timing
         digest = hashlib.sha256(canonical_json(identity))
         for function in self.system.functions.values():
             digest.update(_instructions(function))
@@ -214,6 +218,7 @@ def bind(
     period: float = PERIOD,
     seed: int = 0,
     run: int = 0,
+    timing: Sequence[str] = (),
 ) -> Export:
     """The Export of a structure with these numbers.
 
@@ -225,6 +230,7 @@ def bind(
     tables     data of the table signals, in the order of System.tables, for real = "double"; () leaves them out
     period     s between two commands, which the states of a controller go by
     seed, run  what the noise of sensors goes by
+    timing     sentences to print on the sample periods and delays that the loop bears
     Raises ValueError for a wrong number of values or tables, a value out of its bounds, an unknown name or an unusable
     prefix.
     """
@@ -241,7 +247,8 @@ def bind(
     if tables and (len(tables) != len(system.tables) or real != "double"):
         raise ValueError(f"{len(tables)} tables in {real}, expected {len(system.tables)} in double")
     seconds = number("period", period, positive=True)
-    return Export(system, numbers, _tunable(system.slots, tunable), prefix, real, tuple(tables), seconds, seed, run)
+    free, tabled = _tunable(system.slots, tunable), tuple(tables)
+    return Export(system, numbers, free, prefix, real, tabled, seconds, seed, run, tuple(timing))
 
 
 _STRUCTURAL = ("law", "controller", "observer", "feedforward", "log_form", "mode", "period", "fast", "l", "m", "p", "r")

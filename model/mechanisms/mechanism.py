@@ -56,7 +56,6 @@ class Mechanism:
     regular           whether its mass matrix is positive definite for all that its parameters may be
     sizes             how many joints it may have, where that is open; `of_size` then gives the arm with so many
     source            where its equations and numbers come from, a sentence; "" where there is nothing to cite
-    sampling          what sample periods and delays its loop was seen to bear, Markdown for those who embed it; ""
                       where nothing was measured
     """
 
@@ -75,7 +74,6 @@ class Mechanism:
     regular: ClassVar[bool] = False
     sizes: ClassVar[Sequence[int]] = ()
     source: ClassVar[str] = ""
-    sampling: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
         """Fill in what the class leaves open and depends on how many joints it has."""

@@ -45,18 +45,6 @@ class TransferManipulator(Mechanism):
 
     regular = True
     source = "Guo et al. 2023, Journal of Marine Science and Engineering 11(3) 474."
-    sampling = """Measured on this arm and drive with the packaged gains (`paper/nominal`), delay being the time from
-measurement to command:
-
-| sample period | largest delay that survived |
-|---|---|
-| 0.1 ms, 0.5 ms | 0.7 ms |
-| 1 ms | 0.5 ms |
-| 2 ms | 0.1 ms |
-
-Tried in steps of 0.1 ms: from 0.5 ms on the next delay diverges, so at 1 ms one further sample does. At 2.1 ms (476 Hz)
-the loop diverges without any delay.
-"""
 
     def positions(self, q: ca.SX, p: Values) -> tuple[ca.SX, ca.SX]:
         """Centroids of the lifting and the rotating part, 3 x 1, m, base frame."""

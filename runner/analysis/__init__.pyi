@@ -29,3 +29,4 @@ from .reaching import reaching_law as reaching_law
 from .report import write_report as write_report
 from .sampled import period_max as period_max
 from .sampled import radius as radius
+from .timing import timing as timing

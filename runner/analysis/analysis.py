@@ -23,6 +23,7 @@ from springline.runner.analysis.modes import TimeScales, fast_gain, time_scales
 from springline.runner.analysis.proof import Proof, proof_of, proof_reaches
 from springline.runner.analysis.reaching import AMPLITUDES
 from springline.runner.analysis.sampled import period_max, rates_of
+from springline.runner.analysis.timing import unbounded_gain
 from springline.runner.files import InputError, Problem
 from springline.runner.run import Progress, simulate
 from springline.runner.scenario import Scenario, expect_scenario, given_text
@@ -41,7 +42,6 @@ SLIM_GAIN, SLIM_PHASE = 2.0, math.radians(30.0)
 
 _SMALL = 1e-6  # amplitude of sigma, where limit cycles begin
 _MOST_RANGES = 6
-_UNBOUNDED = 3.0  # gain at the least amplitude, by that at the scenario's: power laws have 30, bounded ones 1.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,13 +199,7 @@ class _Work:
         """That the gain grows without bound as sigma goes to zero, in words; "" where it does not."""
         if not self.gained:
             return ""
-        least, here = (float(np.max(np.abs(loop.N))) for loop in (self.loops[0], self.loop))
-        if least <= _UNBOUNDED * here:
-            return ""
-        return (
-            f"the law's gain grows without bound as sigma goes to zero ({least / here:.3g} times as much at an "
-            f"amplitude of {AMPLITUDES[0]:g} as at {self.amplitude:g})"
-        )
+        return unbounded_gain(self.loops[0], self.loop)
 
     @cached_property
     def found_cycle(self) -> LimitCycle | None:
@@ -528,7 +522,7 @@ def _phase_words(work: _Work, found: Margins, i: int, values: Floats) -> tuple[f
         return None, "rad", True, f"the {joint} motor's channel has a gain below 1 at every frequency"
     how = "slim, " if value < SLIM_PHASE else ""
     frequency = float(found.phase_frequency[i])
-    at = f" at {frequency:.4g} rad/s, {value / frequency:.2g} s of delay there" if frequency > 0 else ""
+    at = f" at {frequency:.4g} rad/s (no measure of delay: that is delay_max)" if frequency > 0 else ""
     text = f"{how}stable until the {joint} motor's channel lags {math.degrees(value):.3g} degrees more{at}"
     return value, "rad", True, text
 

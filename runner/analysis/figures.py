@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,12 +16,16 @@ from springline.runner.analysis.continuous import growth
 from springline.runner.analysis.loop import linear_loop
 from springline.runner.analysis.reaching import AMPLITUDES, LawCurves
 from springline.runner.analysis.sampled import cut, rates_of
-from springline.runner.analysis.sensitivity import Sensitivities
+from springline.runner.analysis.sensitivity import Effect, Sensitivities
 from springline.runner.report import COLUMN, LINES, PAGE, label, legend_above, panels
 
 Floats = NDArray[np.float64]
+Places = NDArray[np.intp]
 
-_MOST_BARS = 10
+_MOST_BARS = 12
+_VISIBLE = 1e-2  # of the longest bar: shorter ones cannot be seen
+_CLIPPED, _LONG = 3.0, 4  # bars end at so many times that one of them, counted from the longest, which is 0
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _GIVEN: Mapping[str, Any] = {"color": "0.25", "linewidth": 0.9, "linestyle": (0, (1, 1.5))}
 _LIMIT: Mapping[str, Any] = {"color": "0.25", "linewidth": 0.9, "linestyle": (0, (4, 2))}
 _LAYERS = 61
@@ -143,35 +148,72 @@ def laws(found: Analysis, curves: Mapping[str, LawCurves]) -> Figure | None:
     return figure
 
 
-def tornado(found: Sensitivities) -> Figure | None:
-    """What ten percent of each parameter does, the strongest on top; None where nothing does anything."""
-    if not found.effects or not found.keys:
+def tornado(found: Sensitivities, units: Mapping[str, str]) -> Figure | None:
+    """What ten percent of each parameter does, the strongest on top; None where nothing does anything.
+
+    units  of the parameters, by key
+    """
+    ranked = [(effect, _strongest(effect)) for effect in found.effects] if found.keys else []
+    ranked = [(effect, order) for effect, order in ranked if len(order)]
+    if not ranked:
         return None
-    count = len(found.effects)
-    bars = min(_MOST_BARS, len(found.keys))
-    figure, grid = panels(1, count, width=PAGE, height=0.3 + 0.2 * bars, share_x=False)
-    for axes, effect in zip(grid[0], found.effects, strict=True):
-        order = np.argsort(-effect.reach, kind="stable")[:bars]
-        for side, line, name in ((effect.low, LINES[0], "10 % less"), (effect.high, LINES[1], "10 % more")):
-            change = 100 * (side[order] - effect.nominal) / abs(effect.nominal)
-            axes.barh(np.arange(len(order)), np.nan_to_num(change), 0.7, color=line["color"], label=name, alpha=0.9)
-            for place in np.flatnonzero(np.isnan(change)):
-                axes.text(0.0, float(place), " none ", color=line["color"], fontsize=6, va="center")
-        axes.set_yticks(range(len(order)), [_short(found.keys[k]) for k in order])
+    bars = max(len(order) for _, order in ranked)
+    figure, grid = panels(1, len(ranked), width=PAGE, height=0.5 + 0.2 * bars, share_x=False)
+    for axes, (effect, order) in zip(grid[0], ranked, strict=True):
+        _bars(axes, effect, order)
+        names = [_short(found.keys[k], units.get(found.keys[k], "")) for k in order]
+        axes.set_yticks(range(len(order)), names)
         axes.tick_params(axis="y", labelsize=6)
-        axes.set_ylim(len(order) - 0.4, -0.6)
-        axes.axvline(0.0, color="black", linewidth=0.6)
-        axes.margins(x=0.08)
-        unit = f" {effect.unit}" if effect.unit else ""
-        axes.set_title(f"{effect.title}: {effect.nominal:.3g}{unit}", fontsize=7)
-        axes.set_xlabel("change [%]")
+        axes.set_ylim(bars - 0.4, -0.6)
+        axes.grid(visible=False, axis="y")
     legend_above(figure)
     return figure
 
 
-def _short(key: str) -> str:
-    """A key as it labels a bar: without the table that says nothing."""
-    return key.removeprefix("mechanism.").removeprefix("control.").removeprefix("drive.")
+def _strongest(effect: Effect) -> Places:
+    """The parameters that move a quantity most, at most _MOST_BARS; what ceases to exist comes first."""
+    change = np.abs(np.stack([effect.low, effect.high]) - effect.nominal)
+    most = np.where(np.isnan(change), np.inf, change).max(axis=0)
+    order: Places = np.argsort(-most, kind="stable")[:_MOST_BARS]
+    finite = most[np.isfinite(most)]
+    least = _VISIBLE * float(finite.max()) if finite.size else 0.0
+    kept: Places = order[most[order] > least]
+    return kept
+
+
+def _bars(axes: Axes, effect: Effect, order: Places) -> None:
+    """The quantity's own values, above one another for less and more; a bar that is far too long has its number."""
+    sides = [side[order] for side in (effect.low, effect.high)]
+    change = np.abs(np.stack(sides) - effect.nominal)
+    finite = np.sort(change[np.isfinite(change)])[::-1]
+    reach = float(min(finite[0], _CLIPPED * finite[min(_LONG, len(finite) - 1)])) if finite.size else 1.0
+    reach = reach or float(finite[0]) or 1.0
+    power = 3 * math.floor(math.log10(max(reach, abs(effect.nominal))) / 3)
+    unit = 10.0**power
+    low, high = effect.nominal - reach, effect.nominal + reach
+    for side, offset, line, name in zip(sides, (-0.19, 0.19), LINES, ("10 % less", "10 % more"), strict=False):
+        ends = np.clip(np.where(np.isnan(side), effect.nominal, side), low, high)
+        places = np.arange(len(order)) + offset
+        axes.barh(places, (ends - effect.nominal) / unit, 0.36, effect.nominal / unit, color=line["color"], label=name)
+        for place, value, end in zip(places, side, ends, strict=True):
+            if np.isnan(value) or value != end:
+                text = "none" if np.isnan(value) else f"{value / unit:.3g}"
+                away = "right" if end < effect.nominal else "left"
+                axes.text(end / unit, place, f" {text} ", color=line["color"], fontsize=5, va="center", ha=away)
+    axes.axvline(effect.nominal / unit, color="black", linewidth=0.6)
+    axes.margins(x=0.18)
+    scale = "" if not power else f"10{str(power).translate(_RAISED)} "
+    shown = f" [{scale}{effect.unit}]".replace(" ]", "]") if scale or effect.unit else ""
+    axes.set_title(effect.title, fontsize=7)
+    axes.set_xlabel(f"its value{shown}")
+
+
+def _short(key: str, unit: str) -> str:
+    """A key as it labels a bar: without the table that says nothing, and with its unit."""
+    name = key.removeprefix("mechanism.").removeprefix("control.").removeprefix("drive.")
+    if " or " in unit:
+        return f"{name} [{unit}]"
+    return label(name, unit) if unit not in ("", "1", "SI") else name
 
 
 def figures(
@@ -205,9 +247,10 @@ def figures(
         ),
         (
             "tornado",
-            "**Sensitivities.** Each parameter moved by ten percent of itself; mechanism and drive move the arm and "
-            "what the controller knows of it, plant.*.scale the arm alone.",
-            tornado(sensitivity),
+            "**Sensitivities.** Each parameter moved by ten percent of itself, from the value that the scenario has "
+            "(line); mechanism and drive move the arm and what the controller knows of it, plant.*.scale the arm "
+            "alone. Bars that would be too long have their number; the table has all.",
+            tornado(sensitivity, {key: item.unit for key, item in found.scenario.numeric_keys().items()}),
         ),
     )
     return [(name, caption, figure) for name, caption, figure in made if figure is not None]

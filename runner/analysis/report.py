@@ -203,6 +203,20 @@ def _document(
             Heading("Reaching laws"),
             Table(["law", *heads], compared, "–: no limit cycle above 10⁻⁶ is predicted."),
         ]
+    if moved.keys:
+        keys = scenario.numeric_keys()
+        heads = ["parameter", "[unit]"]
+        heads += [f"{effect.title}, {way}" for effect in moved.effects for way in ("10 % less", "10 % more")]
+        changed = [
+            (
+                f"`{key}`",
+                keys[key].unit,
+                *(_shown(float(side[k])) for effect in moved.effects for side in (effect.low, effect.high)),
+            )
+            for k, key in enumerate(moved.keys)
+        ]
+        now = "; ".join(f"{item.title} {_shown(item.nominal)} {item.unit}".rstrip() for item in moved.effects)
+        blocks += [Heading("Sensitivities"), Table(heads, changed, f"As it is: {now}.", labels=2)]
     blocks += [Heading("Figures"), *pictures]
     subtitle = f"{scenario.source}, analysed by springline {__version__} from its linearised equations and its proof."
     return Document("What the design can do", subtitle, blocks)

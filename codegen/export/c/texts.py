@@ -103,7 +103,8 @@ def _values(export: Export, interface: TypedInterface) -> dict[str, Any]:
         "of_tables": [name for name in interface.bodies if interface.reads_tables(name)],
         "measured_base": interface.measured_base,
         "missing_tables": interface.missing_tables,
-        "timing": _timing(export),
+        "timing": export.timing,
+        "main": _timing(export),
     }
 
 
@@ -188,7 +189,6 @@ def _readme(export: Export, interface: TypedInterface) -> dict[str, Any]:
     tunable = set(export.tunable)
     return {
         "joints": export.system.n,
-        "sampling": export.system.mechanism.sampling,
         "parameters": [
             (slot.key, value, slot.unit, "run" if i in tunable else "baked")
             for i, (slot, value) in enumerate(zip(export.slots, export.values, strict=True))

@@ -46,6 +46,7 @@ def fmu(
     name: str,
     tables: Sequence[SignalTable] = (),
     tunable: Sequence[str] | Literal["all", "none"] = "all",
+    timing: Sequence[str] = (),
 ) -> bytes:
     """The FMU file: description, C sources, binary for this machine, documentation and icon.
 
@@ -57,6 +58,7 @@ def fmu(
     name        modelName, for people
     tables      the data of the structure's table signals, in the order of System.tables
     tunable     parameters of the part that may be set: slot keys or what stands for several; the rest are constants
+    timing      sentences on the sample periods and delays that the closed loop bears, for the page
     The same arguments give the same bytes on the same machine.
     The forces that disturb the links are inputs of plant and loop where the structure has none.
     Raises ValueError for a value out of its bounds, an unknown name or an unusable identifier; ToolchainError without
@@ -83,6 +85,7 @@ def fmu(
         period=settings.sample,
         seed=settings.seed,
         run=settings.run,
+        timing=timing,
     )
     typed = TypedInterface(export, with_tip=part != "controller", with_judged=part == "loop")
     shown = interface(export, typed, part, sampled=part == "controller" or settings.period > 0.0)

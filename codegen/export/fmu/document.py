@@ -59,5 +59,6 @@ def document(
             (title, [variable for variable in variables if variable.causality == causality])
             for title, causality in _CAUSALITIES.items()
         ],
+        timing=export.timing,
         provenance=provenance(export),
     ).encode()

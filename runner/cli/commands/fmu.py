@@ -73,6 +73,7 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
     ) -> None:
         from springline.codegen.export import LONGEST
         from springline.codegen.export.fmu import fmu
+        from springline.runner.analysis import timing
         from springline.runner.scenario import kernel_tables, load_scenario
 
         expect_folder(output)
@@ -83,6 +84,7 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         begin = stem if stem[:1].isalpha() else f"scenario_{stem}"
         end = f"_{part}_fmi{version}"
         identifier = name or re.sub("_+", "_", begin[: LONGEST - len(end)] + end)
+        sentences = timing(loaded)
         try:
             content = fmu(
                 loaded.structure(),
@@ -94,6 +96,7 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
                 name=f"springline {stem} {part}",
                 tables=kernel_tables(loaded.tables()),
                 tunable=tunable_names(tunable),
+                timing=sentences,
             )
         except ValueError as error:  # the scenario's numbers are in their bounds, so this is --tunable or --name
             raise InputError(Problem(f"springline export fmu{version}", "", str(error))) from error

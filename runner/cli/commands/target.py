@@ -85,6 +85,7 @@ def tree_command(
     ) -> None:
         from springline.codegen.export import bind
         from springline.codegen.export.c import Overflow
+        from springline.runner.analysis import timing
         from springline.runner.scenario import load_scenario
 
         expect_folder(output, writable=not check)
@@ -92,6 +93,7 @@ def tree_command(
         for warning in loaded.warnings:
             complain(warning)
         names = tunable_names(tunable)
+        sentences = timing(loaded)
         try:
             period = max(loaded.control_every, 1) * loaded.step
             export = bind(
@@ -103,6 +105,7 @@ def tree_command(
                 period=period,
                 seed=loaded.seed,
                 run=loaded.run_number,
+                timing=sentences,
             )
             files, manifest = tree(export)
         except Overflow as error:

@@ -6,6 +6,7 @@ Two clients that are not ours drive them: fmpy, and the container of fmu-manipul
 from __future__ import annotations
 
 import ctypes
+import html
 import io
 import json
 import os
@@ -28,6 +29,7 @@ from fmi_client import (
     PERIOD,
     SAMPLED,
     STEP,
+    TIMING,
     Build,
     Open,
     Values,
@@ -64,6 +66,7 @@ def test_contents(build: Build, version: int) -> None:
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         root = ET.fromstring(archive.read("modelDescription.xml"))  # noqa: S314 - our own
         page = archive.read("documentation/index.html").decode()
+    assert html.escape(TIMING) in page
     icon, licence = {
         2: ("model.png", "documentation/license.txt"),
         3: ("terminalsAndIcons/icon.png", "documentation/licenses/license.txt"),
