@@ -10,17 +10,20 @@ from __future__ import annotations
 
 import io
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import Formatter
 from numpy.typing import NDArray
 
 from springline.model.quantities import Quantity, T
+from springline.runner.report.scale import prefixed, tick_texts, unit_text
 
 Floats = NDArray[np.float64]
 
@@ -86,7 +89,12 @@ def house_style() -> Iterator[None]:
 
 
 def panels(
-    rows: int = 1, columns: int = 1, *, width: float = COLUMN, height: float = 1.5, share_x: bool = True
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    width: float = COLUMN,
+    height: float = 1.5,
+    share_x: bool | Literal["col"] = True,
 ) -> tuple[Figure, NDArray[Any]]:
     """A figure and its (rows, columns) array of Axes; width of the figure and height of a row in inches."""
     figure = Figure(figsize=(width, height * rows + 0.5))
@@ -95,8 +103,36 @@ def panels(
 
 def label(quantity: str, unit: str) -> str:
     """Axis label "quantity [unit]", powers raised; "1" and "" are no unit."""
-    shown = unit.replace("^2", "²").replace("^3", "³").replace(" ", " · ")
-    return quantity if unit in {"", "1"} else f"{quantity} [{shown}]"
+    return quantity if unit in {"", "1"} else f"{quantity} [{unit_text(unit)}]"
+
+
+class _Scaled(Formatter):
+    """Ticks of a linear axis times a factor, all with the same decimals, and no power of ten beside the axis."""
+
+    def __init__(self, factor: float) -> None:
+        self._factor = factor
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The text of one value."""
+        return tick_texts([*self.locs, x], self._factor)[-1]
+
+    def format_ticks(self, values: Sequence[float]) -> list[str]:
+        """The texts of all ticks."""
+        self.set_locs(values)
+        return tick_texts(values, self._factor)
+
+
+def name_axis(axis: Axis, quantity: str, unit: str) -> None:
+    """Label an axis, with the SI prefix that its numbers call for ("error [mm]"): once all is drawn."""
+    if axis.get_scale() != "linear":
+        axis.set_label_text(label(quantity, unit))
+        return
+    axes = axis.axes
+    low, high = axes.get_xlim() if axis is axes.xaxis else axes.get_ylim()
+    factor, shown = prefixed(unit, max(abs(low), abs(high)))
+    axis.set_label_text(label(quantity, shown))
+    if factor != 1.0:
+        axis.set_major_formatter(_Scaled(factor))
 
 
 def symbol(quantity: Quantity) -> str:

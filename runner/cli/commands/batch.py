@@ -298,8 +298,7 @@ def replay(
     from springline.runner.cli.commands.run import OUTPUTS, print_metrics
     from springline.runner.cli.options import refuse_occupied
     from springline.runner.files import table_files, units, write_folder
-    from springline.runner.report import figure_files
-    from springline.runner.run import run_figures, simulate
+    from springline.runner.run import report_files, simulate
     from springline.runner.scenario import expect_kind
     from springline.runner.sweep import Dataset, place, recorded_run, stored_plan
 
@@ -312,9 +311,7 @@ def replay(
         complain(recorded.flaw)
     result = simulate(recorded.scenario)
     files = recorded.files(folder)
-    if plot:
-        for name, figure in run_figures(recorded.scenario, result).items():
-            files |= figure_files(f"figures/{name}", figure)
+    files |= report_files(recorded.scenario, result, plot=plot)
     files |= table_files("trajectory", result.trajectory)
     files |= table_files("metrics", result.metrics)
     write_folder(folder, files, replaces=OUTPUTS)
