@@ -191,7 +191,7 @@ def _signals(table: Mapping[str, Any], joints: Sequence[Joint], unit: str) -> st
 
 def _sines(terms: Sequence[Term]) -> str:
     return " + ".join(
-        f"{figure_text(t['amplitude'])} sin({figure_text(t['omega'])} t{_phase(t.get('phase', 0.0))})" for t in terms
+        f"{'' if t['amplitude'] == 1.0 else figure_text(t['amplitude']) + ' '}sin({figure_text(t['omega'])} t{_phase(t.get('phase', 0.0))})" for t in terms
     )
 
 

@@ -18,6 +18,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter
 from numpy.typing import NDArray
@@ -183,15 +185,13 @@ def figure_files(name: str, figure: Figure) -> dict[str, bytes]:
     Its layout is final after that.
     """
     with house_style():
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # or every file is laid out anew
-        return {
-            f"{name}.png": _saved(figure, "png", {"Software": None}),
-            f"{name}.svg": _saved(figure, "svg", {"Date": None, "Creator": None}),
-        }
-
-
-def _saved(figure: Figure, form: str, metadata: Mapping[str, str | None]) -> bytes:
-    sink = io.BytesIO()
-    figure.savefig(sink, format=form, metadata=metadata)
-    return sink.getvalue()
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            engine.execute(figure)
+            figure.set_layout_engine("none")  # or every file is laid out anew
+        # Not by savefig, which draws each file twice: once to lay it out.
+        figure.set_dpi(STYLE["savefig.dpi"])
+        pixels, vectors = io.BytesIO(), io.BytesIO()
+        FigureCanvasAgg(figure).print_png(pixels, metadata={"Software": None})
+        FigureCanvasSVG(figure).print_svg(vectors, metadata={"Date": None, "Creator": None})
+        return {f"{name}.png": pixels.getvalue(), f"{name}.svg": vectors.getvalue()}

@@ -32,6 +32,7 @@ from springline.runner.report import (
     quantity_text,
     symbol,
 )
+from springline.runner.run.columns import values
 from springline.runner.run.simulation import Result
 from springline.runner.scenario import Scenario
 
@@ -130,8 +131,7 @@ class _Run:
         )
 
     def __getitem__(self, column: str) -> Floats:
-        values: Floats = self._table[column].to_numpy()
-        return values
+        return values(self._table[column])
 
     @property
     def settled(self) -> NDArray[np.bool_]:
@@ -218,12 +218,6 @@ def _time_axis(run: _Run, figure: Figure, bottom: Sequence[Axes]) -> None:
             axes.axvline(run.t[-1], color="#D55E00", linestyle=":", label=stopped)
 
 
-def _split_words(run: _Run) -> str:
-    """What the columns of a figure are, for a caption."""
-    parts = run.parts
-    return "." if len(parts) == 1 else f": left {parts[0].title}, right {parts[1].title}."
-
-
 def _tracking(run: _Run) -> Drawn:
     whole = _Part("the whole run", np.ones(len(run.t), dtype=np.bool_))
     parts = run.parts if len(run.parts) == 1 or run.parts[0].title == whole.title else [run.parts[0], whole]
@@ -271,7 +265,7 @@ def _error(run: _Run) -> Drawn:
                 )
 
     figure = _joint_panels(run, f"error {symbol(E)}", E, drawing, parts=parts)
-    return Drawn(figure, f"Tracking error{_split_words(run)}{_steady_words(run)}")
+    return Drawn(figure, f"Tracking error.{_steady_words(run)}")
 
 
 def _steady_words(run: _Run) -> str:
@@ -288,7 +282,7 @@ def _sliding(run: _Run) -> Drawn:
         draw(axes, run.t[part.rows], run[f"{SIGMA.name}_{joint.name}"][part.rows], **LINES[0])
 
     figure = _joint_panels(run, f"sliding {symbol(SIGMA)}", SIGMA, drawing)
-    return Drawn(figure, f"Sliding variable, zero on the surface{_split_words(run)}")
+    return Drawn(figure, "Sliding variable, zero on the surface.")
 
 
 def _phase_plane(run: _Run) -> Drawn:
@@ -390,7 +384,7 @@ def _force(run: _Run) -> Drawn:
         elif limit > _IN_SIGHT * float(np.max(np.abs(run[f"{U.name}_{joint.name}"]))):
             beyond.append(f"{joint.name}'s is {quantity_text(limit, joint.force)}, beyond the axis")
     of_limits = f" Of limits: {'; '.join(beyond)}." if beyond else ""
-    return Drawn(figure, f"What the motors do{_split_words(run)}{of_limits}")
+    return Drawn(figure, f"What the motors do.{of_limits}")
 
 
 def _springs(run: _Run) -> Drawn:
@@ -399,7 +393,7 @@ def _springs(run: _Run) -> Drawn:
         draw(axes, run.t[part.rows], deflection[part.rows], **LINES[0])
 
     figure = _joint_panels(run, f"spring {symbol(Q2)} − {symbol(Q1)}", Q2, drawing)
-    return Drawn(figure, f"Deflection of the springs between motor and link{_split_words(run)}")
+    return Drawn(figure, "Deflection of the springs between motor and link.")
 
 
 def _disturbance(run: _Run) -> Drawn:

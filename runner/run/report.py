@@ -30,6 +30,7 @@ from springline.runner.report import (
     shown_name,
     to_html,
 )
+from springline.runner.run.columns import values
 from springline.runner.run.simulation import Result
 from springline.runner.run.trajectory_hash import trajectory_hash
 from springline.runner.scenario import Scenario
@@ -126,8 +127,7 @@ class _Numbers:
         self._metrics: Mapping[str, Any] = result.metrics.to_pylist()[0]
 
     def __getitem__(self, column: str) -> Floats:
-        values: Floats = self._table[column].to_numpy()
-        return values
+        return values(self._table[column])
 
     def metric(self, name: str, joint: Joint) -> float | None:
         value: float | None = self._metrics[f"{name}_{joint.name}"]
@@ -172,7 +172,7 @@ def _chatter(run: _Numbers, joint: Joint) -> Verdict:
     if value is None:
         return Verdict(f"{joint.name}: command", "", "Whether it chatters is not known.")
     text = (
-        f"In the second half it goes through its range {figure_text(value, 3)} times a second; calm is up to "
+        f"In the second half it varies by {figure_text(value, 3)} times its range in a second; calm is up to "
         f"{CHATTERING:g}."
     )
     return Verdict(f"{joint.name}: command", "chatters" if chatters(np.float64(value), run.end) else "calm", text)
@@ -231,11 +231,11 @@ def _spring(run: _Numbers, joint: Joint) -> Verdict:
 def _metrics(scenario: Scenario, result: Result) -> Table:
     """The metrics, a row each and a column a joint."""
     joints, unit = scenario.system().joints, units(result.metrics)
-    values: Mapping[str, Any] = result.metrics.to_pylist()[0]
+    found: Mapping[str, Any] = result.metrics.to_pylist()[0]
     rows = []
     for metric in METRICS:
         columns = [f"{metric.name}_{joint.name}" for joint in joints]
-        rows.append((f"`{metric.name}`", *(quantity_text(values[c], unit[c]) for c in columns), metric.meaning))
+        rows.append((f"`{metric.name}`", *(quantity_text(found[c], unit[c]) for c in columns), metric.meaning.replace("^2", "²")))
     heads = ("", *(joint.name for joint in joints), "what it is")
     caption = "Bands are shares of the initial error unless they are absolute. –: there is no such number."
     return Table(heads, rows, caption, words=(len(joints) + 1,))
