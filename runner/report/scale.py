@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -20,22 +21,13 @@ def prefixed(unit: str, size: float) -> tuple[float, str]:
     a mass and a plain number take none.
     """
     first = unit.replace("/", " ").partition(" ")[0]
-    if first not in _TAKE_PREFIX or not math.isfinite(size) or size == 0.0:
+    if first not in _TAKE_PREFIX or not math.isfinite(size) or size == 0.0 or _LEAST <= size < _MOST:
         return 1.0, unit
-    factor, prefix = 1.0, ""
     if size < _LEAST:
-        for prefix in _DOWN:
-            factor *= 1e3
-            if size * factor >= _LEAST:
-                break
-        else:
-            return 1.0, unit
-    elif size >= _MOST:
-        for prefix in _UP:
-            factor /= 1e3
-            if size * factor < _MOST:
-                break
-    return factor, prefix + unit
+        smaller = ((10.0 ** (3 * k), prefix) for k, prefix in enumerate(_DOWN, 1))
+        return next(((factor, prefix + unit) for factor, prefix in smaller if size * factor >= _LEAST), (1.0, unit))
+    larger = ((10.0 ** (-3 * k), prefix) for k, prefix in enumerate(_UP, 1))
+    return next(((factor, prefix + unit) for factor, prefix in larger if size * factor < _MOST), (1.0, unit))
 
 
 def unit_text(unit: str) -> str:
@@ -44,7 +36,7 @@ def unit_text(unit: str) -> str:
 
 
 def figure_text(value: float, digits: int = 4) -> str:
-    """A number for people, with a minus sign, significant digits and, where it is very large or small, a power of ten."""
+    """A number for people: significant digits, a minus sign, a power of ten where it is very large or small."""
     if math.isnan(value):
         return "–"
     if math.isinf(value):
@@ -64,7 +56,8 @@ def quantity_text(value: float | None, unit: str, digits: int = 4) -> str:
 def tick_texts(ticks: Sequence[float], factor: float) -> list[str]:
     """Ticks of an axis times `factor`, all with as many decimals as tell them."""
     scaled = [tick * factor for tick in ticks]
-    gap = min((b - a for a, b in zip(scaled, scaled[1:], strict=False) if b > a), default=max(map(abs, scaled), default=1))
+    gaps = (b - a for a, b in itertools.pairwise(scaled) if b > a)
+    gap = min(gaps, default=max(map(abs, scaled), default=1.0))
     decimals = next(
         (d for d in range(_FINEST) if all(abs(round(value, d) - value) <= 1e-4 * gap for value in scaled)), _FINEST
     )

@@ -10,7 +10,7 @@ from typing import Any
 
 from springline.model.base import COORDINATES
 from springline.model.control import LAWS
-from springline.model.hardware import ACTUATORS, SENSORS
+from springline.model.hardware import ACTUATORS, SENSORS, Effect
 from springline.model.parameters import Joint
 from springline.runner.files import value_text
 from springline.runner.report.document import Block, Heading, Source, Table
@@ -80,10 +80,9 @@ def _row(name: str, text: str) -> list[tuple[str, str]]:
 
 def _joined(values: Iterable[float], joints: Sequence[Joint], unit: str) -> str:
     """A number for each joint, once where all are the same; `unit` with {q} and {F} for the joint's."""
-    texts = [
-        quantity_text(value, unit.format(q=joint.unit, F=joint.force)) for value, joint in zip(values, joints, strict=True)
-    ]
-    return " / ".join(dict.fromkeys(texts)) if len(set(texts)) == 1 else " / ".join(texts)
+    pairs = zip(values, joints, strict=True)
+    texts = [quantity_text(value, unit.format(q=joint.unit, F=joint.force)) for value, joint in pairs]
+    return texts[0] if len(set(texts)) == 1 else " / ".join(texts)
 
 
 def _plant(table: Mapping[str, Any]) -> str:
@@ -97,7 +96,8 @@ def _plant(table: Mapping[str, Any]) -> str:
 def _limits(scenario: Scenario, joints: Sequence[Joint]) -> str:
     pairs = zip(joints, scenario.limits, strict=False)
     return ", ".join(
-        f"{joint.name} {quantity_text(low, joint.unit)} to {quantity_text(high, joint.unit)}" for joint, (low, high) in pairs
+        f"{joint.name} {quantity_text(low, joint.unit)} to {quantity_text(high, joint.unit)}"
+        for joint, (low, high) in pairs
     )
 
 
@@ -132,25 +132,23 @@ def _command_limits(scenario: Scenario, joints: Sequence[Joint]) -> str:
 
 
 def _sensors(scenario: Scenario, joints: Sequence[Joint]) -> str:
-    table, structure = scenario.document["sensor"], scenario.structure()
-    shown = [item for item in SENSORS if item.name in structure.effects]
-    texts = [
-        f"{effect.name.replace('_', ' ')} {_joined(table[effect.name], joints, effect.parameters[0].unit)}" for effect in shown
-    ]
-    if structure.differenced:
+    texts = _effects(SENSORS, scenario, joints)
+    if scenario.structure().differenced:
         texts.append("rates made out of positions by differences")
     return ", ".join(texts)
 
 
 def _actuators(scenario: Scenario, joints: Sequence[Joint]) -> str:
-    table, structure = scenario.document["actuator"], scenario.structure()
-    texts = [f"delay {quantity_text(table['delay'], 's')}"] if table["delay"] else []
-    texts += [
-        f"{effect.name.replace('_', ' ')} {_joined(table[effect.name], joints, effect.parameters[0].unit)}"
-        for effect in ACTUATORS
-        if effect.name in structure.effects
-    ]
-    return ", ".join(texts)
+    delay = scenario.document["actuator"]["delay"]
+    texts = [f"delay {quantity_text(delay, 's')}"] if delay else []
+    return ", ".join([*texts, *_effects(ACTUATORS, scenario, joints)])
+
+
+def _effects(known: Iterable[Effect], scenario: Scenario, joints: Sequence[Joint]) -> list[str]:
+    """Those effects that a scenario has, with their numbers."""
+    present = [effect for effect in known if effect.name in scenario.structure().effects]
+    numbers = [_joined(scenario.document[e.table][e.name], joints, e.parameters[0].unit) for e in present]
+    return [f"{effect.name.replace('_', ' ')} {text}" for effect, text in zip(present, numbers, strict=True)]
 
 
 def _base_motion(scenario: Scenario) -> str:
@@ -191,8 +189,12 @@ def _signals(table: Mapping[str, Any], joints: Sequence[Joint], unit: str) -> st
 
 def _sines(terms: Sequence[Term]) -> str:
     return " + ".join(
-        f"{'' if t['amplitude'] == 1.0 else figure_text(t['amplitude']) + ' '}sin({figure_text(t['omega'])} t{_phase(t.get('phase', 0.0))})" for t in terms
+        f"{_factor(t['amplitude'])}sin({_factor(t['omega'])}t{_phase(t.get('phase', 0.0))})" for t in terms
     )
+
+
+def _factor(value: float) -> str:
+    return "" if value == 1.0 else f"{figure_text(value)} "
 
 
 def _phase(phase: float) -> str:
@@ -218,4 +220,3 @@ def _run(scenario: Scenario) -> str:
     length, step = (quantity_text(value, "s") for value in (simulation["duration"], scenario.step))
     every = f", a row every {scenario.output_every} steps" if scenario.output_every > 1 else ""
     return f"{length} in {scenario.steps} steps of {step}, {scenario.integrator}{every}"
-

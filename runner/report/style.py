@@ -120,21 +120,40 @@ class _Scaled(Formatter):
 
     def format_ticks(self, values: Sequence[float]) -> list[str]:
         """The texts of all ticks."""
-        self.set_locs(values)
+        self.set_locs(list(values))
         return tick_texts(values, self._factor)
 
 
+class _Decades(Formatter):
+    """Ticks of a logarithmic axis times a factor, written out."""
+
+    def __init__(self, factor: float) -> None:
+        self._factor = factor
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The text of one value."""
+        return f"{x * self._factor:.6g}"
+
+
 def name_axis(axis: Axis, quantity: str, unit: str) -> None:
-    """Label an axis, with the SI prefix that its numbers call for ("error [mm]"): once all is drawn."""
-    if axis.get_scale() != "linear":
-        axis.set_label_text(label(quantity, unit))
-        return
-    axes = axis.axes
-    low, high = axes.get_xlim() if axis is axes.xaxis else axes.get_ylim()
-    factor, shown = prefixed(unit, max(abs(low), abs(high)))
+    """Label an axis, with the SI prefix that its numbers call for ("error [mm]"): once all is drawn.
+
+    A logarithmic axis gets it too; its locator stays.
+    """
+    scale = axis.get_scale()
+    low, high = axis.get_view_interval() if scale == "log" else _limits(axis)
+    size = float(np.sqrt(low * high)) if scale == "log" else max(abs(low), abs(high))
+    factor, shown = (1.0, unit) if scale not in {"linear", "log"} else prefixed(unit, size)
     axis.set_label_text(label(quantity, shown))
     if factor != 1.0:
-        axis.set_major_formatter(_Scaled(factor))
+        axis.set_major_formatter(_Scaled(factor) if scale == "linear" else _Decades(factor))
+
+
+def _limits(axis: Axis) -> tuple[float, float]:
+    """The ends of an axis, its data taken in."""
+    axes = axis.axes
+    low, high = axes.get_xlim() if axis is axes.xaxis else axes.get_ylim()
+    return float(low), float(high)
 
 
 def symbol(quantity: Quantity) -> str:
@@ -192,6 +211,6 @@ def figure_files(name: str, figure: Figure) -> dict[str, bytes]:
         # Not by savefig, which draws each file twice: once to lay it out.
         figure.set_dpi(STYLE["savefig.dpi"])
         pixels, vectors = io.BytesIO(), io.BytesIO()
-        FigureCanvasAgg(figure).print_png(pixels, metadata={"Software": None})
-        FigureCanvasSVG(figure).print_svg(vectors, metadata={"Date": None, "Creator": None})
+        FigureCanvasAgg(figure).print_png(pixels, metadata={"Software": None})  # type: ignore[no-untyped-call]
+        FigureCanvasSVG(figure).print_svg(vectors, metadata={"Date": None, "Creator": None})  # type: ignore[no-untyped-call]
         return {f"{name}.png": pixels.getvalue(), f"{name}.svg": vectors.getvalue()}

@@ -57,7 +57,7 @@ def values(column: pa.ChunkedArray) -> Floats:
     Not by to_numpy, nor with a value for null unless there is one: both import pandas where that is installed.
     """
     parts = [np.from_dlpack(part) for part in (column.fill_null(np.nan) if column.null_count else column).chunks]
-    return parts[0] if len(parts) == 1 else np.concatenate([np.zeros(0), *parts])
+    return np.asarray(parts[0] if len(parts) == 1 else np.concatenate([np.zeros(0), *parts]), dtype=np.float64)
 
 
 # pa.array imports pandas where that is installed, to ask whether what it is given is pandas': longer than a run takes.

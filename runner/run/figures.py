@@ -25,7 +25,6 @@ from springline.runner.report import (
     TIME,
     draw,
     house_style,
-    label,
     legend_above,
     name_axis,
     panels,
@@ -176,7 +175,13 @@ Drawing = Callable[[Axes, Joint, _Part], None]
 
 
 def _joint_panels(
-    run: _Run, text: str, quantity: Quantity, drawing: Drawing, *, joints: Sequence[Joint] = (), parts: Sequence[_Part] = ()
+    run: _Run,
+    text: str,
+    quantity: Quantity,
+    drawing: Drawing,
+    *,
+    joints: Sequence[Joint] = (),
+    parts: Sequence[_Part] = (),
 ) -> Figure:
     """One row of panels a joint (of `joints`, or of all) over time, one column a part of the run.
 
@@ -300,7 +305,7 @@ def _phase_plane(run: _Run) -> Drawn:
         axes.margins(x=0.05)
         if plane.surface:
             box = (*axes.get_xlim(), *axes.get_ylim())
-            x, y = np.meshgrid(np.linspace(*box[:2], _GRID), np.linspace(*box[2:], _GRID))
+            x, y = np.meshgrid(np.linspace(box[0], box[1], _GRID), np.linspace(box[2], box[3], _GRID))
             axes.contour(x, y, plane.sigma(k, x, y), levels=[0.0], colors="black", linestyles="dashed", linewidths=0.8)
             axes.add_line(Line2D([], [], label=f"{symbol(SIGMA)} = 0", **REFERENCE))
             axes.set_xlim(*box[:2])
@@ -347,7 +352,7 @@ class _Plane:
         return bool(np.max(np.abs(found - known[:, some])) <= 1e-6 * np.max(np.abs(known)))
 
     def sigma(self, joint: int, error: Floats, rate: Floats) -> Floats:
-        """The sliding variable of one joint at errors and rates of one shape, the other joints being on the reference."""
+        """The sliding variable of one joint at errors and rates of one shape, the others being on the reference."""
         e, de = np.zeros((self._n, error.size)), np.zeros((self._n, error.size))
         e[joint], de[joint] = error.ravel(), rate.ravel()
         found: Floats = self._evaluated(e, de)[joint].reshape(error.shape)

@@ -175,7 +175,7 @@ def _chatter(run: _Numbers, joint: Joint) -> Verdict:
         f"In the second half it varies by {figure_text(value, 3)} times its range in a second; calm is up to "
         f"{CHATTERING:g}."
     )
-    return Verdict(f"{joint.name}: command", "chatters" if chatters(np.float64(value), run.end) else "calm", text)
+    return Verdict(f"{joint.name}: command", "chatters" if chatters(np.array(value), run.end) else "calm", text)
 
 
 def _motor_limit(run: _Numbers, joint: Joint) -> list[Verdict]:
@@ -217,7 +217,9 @@ def _joint_limit(run: _Numbers, joint: Joint, pair: tuple[float, float]) -> Verd
     margin = float(min((q - pair[0]).min(), (pair[1] - q).min()))
     if math.isinf(margin):
         return Verdict(f"{joint.name}: travel", "", "It has no limit.")
-    return Verdict(f"{joint.name}: travel", "", f"It comes as near as {quantity_text(margin, joint.unit)} to its limit.")
+    return Verdict(
+        f"{joint.name}: travel", "", f"It comes as near as {quantity_text(margin, joint.unit)} to its limit."
+    )
 
 
 def _spring(run: _Numbers, joint: Joint) -> Verdict:
@@ -235,7 +237,13 @@ def _metrics(scenario: Scenario, result: Result) -> Table:
     rows = []
     for metric in METRICS:
         columns = [f"{metric.name}_{joint.name}" for joint in joints]
-        rows.append((f"`{metric.name}`", *(quantity_text(found[c], unit[c]) for c in columns), metric.meaning.replace("^2", "²")))
+        rows.append(
+            (
+                f"`{metric.name}`",
+                *(quantity_text(found[c], unit[c]) for c in columns),
+                metric.meaning.replace("^2", "²"),
+            )
+        )
     heads = ("", *(joint.name for joint in joints), "what it is")
     caption = "Bands are shares of the initial error unless they are absolute. –: there is no such number."
     return Table(heads, rows, caption, words=(len(joints) + 1,))

@@ -171,7 +171,7 @@ def _finish(
             print_json("batch", rows, {}, "failed" if problems else "ok")
         else:
             keys = [axis.key for axis in plan.sweep.axes]
-            keys = keys if len(keys) <= _SHOWN_KEYS else []  # summary.md has room for all
+            keys = keys if len(keys) <= _SHOWN_KEYS else []  # the report has room for all
             for header, rows_of_text in summary_tables(summary, keys):
                 print_table(header, rows_of_text, right=header[1:])
     if problems:

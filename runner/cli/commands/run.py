@@ -66,8 +66,8 @@ def run(
 ) -> None:
     """Simulate one scenario; write its tables and a report with figures.
 
-    report.html, trajectory, metrics, figures and the resolved scenario go into one folder. A run that diverges is a result: it is
-    reported with the quantity and the time, and the exit code is 0.
+    report.html, trajectory, metrics, figures and the resolved scenario go into one folder. A run that diverges is a
+    result: it is reported with the quantity and the time, and the exit code is 0.
     """
     from springline.runner.files import table_files, units, write_folder
     from springline.runner.run import report_files, simulate, trajectory_hash
