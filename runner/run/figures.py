@@ -218,9 +218,13 @@ def _time_axis(run: _Run, figure: Figure, bottom: Sequence[Axes]) -> None:
     for axes in bottom:
         axes.set_xlabel(TIME)
     if run.status != "ok":
-        stopped = f"{run.status.replace('_', ' ')} at {run.t[-1]:g} s"
         for axes in figure.axes:
-            axes.axvline(run.t[-1], color="#D55E00", linestyle=":", label=stopped)
+            axes.axvline(run.t[-1], color="#D55E00", linestyle=":", label=_stopped(run))
+
+
+def _stopped(run: _Run) -> str:
+    """How and when a run stopped, for a legend."""
+    return f"{run.status.replace('_', ' ')} at {run.t[-1]:g} s"
 
 
 def _tracking(run: _Run) -> Drawn:
@@ -302,6 +306,8 @@ def _phase_plane(run: _Run) -> Drawn:
         e, de = plane.error[k], plane.rate[k]
         axes.plot(e, de, label="run", **LINES[0])
         axes.plot(e[0], de[0], "o", markersize=3.5, color="#D55E00", label="start", zorder=3)
+        if run.status != "ok":
+            axes.plot(e[-1], de[-1], "x", markersize=5, color="#D55E00", label=_stopped(run), zorder=3)
         axes.margins(x=0.05)
         if plane.surface:
             box = (*axes.get_xlim(), *axes.get_ylim())
@@ -313,7 +319,7 @@ def _phase_plane(run: _Run) -> Drawn:
         axes.xaxis.set_major_locator(MaxNLocator(5))
         name_axis(axes.xaxis, f"{joint.name} error {symbol(E)}", joint.unit)
         name_axis(axes.yaxis, "its rate", f"{joint.unit}/s")
-    legend_above(figure, columns=3)
+    legend_above(figure, columns=4)
     text = f" Dashed: the surface {symbol(SIGMA)} = 0, along which the error goes to zero." if plane.surface else ""
     return Drawn(figure, f"Error against its rate.{text}")
 

@@ -112,7 +112,7 @@ def _document(scenario: Scenario, result: Result, pictures: Sequence[Picture]) -
         scenario,
         [("rows of the trajectory", rows), ("SHA-256 of their bits", f"`{trajectory_hash(result.trajectory)}`")],
     )
-    subtitle = f"{result.message[0].upper()}{result.message[1:]}. Simulated by springline {__version__}."
+    subtitle = f"{_outcome(result)} Simulated by springline {__version__}."
     return Document(f"A run of {shown_name(scenario)}", subtitle, blocks)
 
 
@@ -136,10 +136,14 @@ class _Numbers:
 
 def _end(run: _Numbers) -> Verdict:
     status = run.result.status
-    word = status.replace("_", " ")
-    if status == "ok":
-        return Verdict("the run", word, f"It came to its end, {quantity_text(run.end, 's')}.")
-    return Verdict("the run", word, f"It stopped: {run.result.message.partition(': ')[2] or run.result.message}.")
+    text = f"It came to its end, {quantity_text(run.end, 's')}." if status == "ok" else _outcome(run.result)
+    return Verdict("the run", status.replace("_", " "), text)
+
+
+def _outcome(result: Result) -> str:
+    """How a run ended, as a sentence."""
+    said = result.message if result.status == "ok" else f"stopped: {result.message.partition(': ')[2]}"
+    return f"{said[0].upper()}{said[1:]}.".replace("<=", "≤")
 
 
 def _settling(run: _Numbers, joint: Joint) -> Verdict:

@@ -249,12 +249,12 @@ def _ranked(title: str, plan: Plan, summary: Summary, found: Sequence[Mapping[st
             str(row["run"]),
             f"[[{_ended(row, plan)}]]",
             quantity_text(row["t_end"], "s"),
-            *(_cell(row[key]) for key in keys),
             *(quantity_text(row[name], summary.units[name]) for name in results),
+            *(_cell(row[key]) for key in keys),
         )
         for row in found
     ]
     names = [name.replace("steady_state", "steady-state").replace("_", " ") for name in results]
-    words = [1, *(3 + k for k, key in enumerate(keys) if any(isinstance(row[key], str) for row in found))]
-    heads = ("run", "status", "end", *(f"`{key}`" for key in keys), *names)
+    words = [1, *(3 + len(results) + k for k, key in enumerate(keys) if any(isinstance(row[key], str) for row in found))]
+    heads = ("run", "status", "end", *names, *(f"`{key}`" for key in keys))
     return [Table(heads, rows, title, labels=0, words=words)]
