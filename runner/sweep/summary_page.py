@@ -255,6 +255,9 @@ def _ranked(title: str, plan: Plan, summary: Summary, found: Sequence[Mapping[st
         for row in found
     ]
     names = [name.replace("steady_state", "steady-state").replace("_", " ") for name in results]
-    words = [1, *(3 + len(results) + k for k, key in enumerate(keys) if any(isinstance(row[key], str) for row in found))]
+    words = [
+        1,
+        *(3 + len(results) + k for k, key in enumerate(keys) if any(isinstance(row[key], str) for row in found)),
+    ]
     heads = ("run", "status", "end", *names, *(f"`{key}`" for key in keys))
     return [Table(heads, rows, title, labels=0, words=words)]
