@@ -13,8 +13,17 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from springline.runner.sweep import Dataset, Plan, load_sweep, open_pool, place, run_sweep, summarize, versions
-from springline.runner.sweep import write_summary
+from springline.runner.sweep import (
+    Dataset,
+    Plan,
+    load_sweep,
+    open_pool,
+    place,
+    run_sweep,
+    summarize,
+    versions,
+    write_summary,
+)
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 

@@ -28,6 +28,8 @@ from springline.runner.report import (
     Text,
     figure_files,
     house_style,
+    provenance,
+    shown_name,
     to_html,
     to_markdown,
 )
@@ -203,5 +205,7 @@ def _document(
             Table(["law", *heads], compared, "–: no limit cycle above 10⁻⁶ is predicted."),
         ]
     blocks += [Heading("Figures"), *pictures]
-    subtitle = f"{scenario.source}, analysed by springline {__version__} from its linearised equations and its proof."
-    return Document("What the design can do", subtitle, blocks)
+    subtitle = (
+        f"{shown_name(scenario)}, analysed by springline {__version__} from its linearised equations and its proof."
+    )
+    return Document("What the design can do", subtitle, [*blocks, *provenance(scenario)])

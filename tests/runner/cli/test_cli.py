@@ -285,6 +285,7 @@ def test_force_replaces_results_and_only_results(results: Path) -> None:
         "trajectory.units.json",
         "metrics.csv",
         "metrics.units.json",
+        "report.html",
     }
     assert set(contents(Path("out"))) == left
     assert not Path("out/figures").exists()
