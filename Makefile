@@ -13,7 +13,7 @@ PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-bui
 SHIPPED = $(shell find springline model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format docs-tables docs-controllers docs-hardware docs-pictures math-accuracy prove firmware bench docs-bench clean FORCE
+.PHONY: help install reproduce test test-full lint format docs-tables docs-controllers docs-hardware docs-sweeps docs-pictures math-accuracy prove firmware bench docs-bench clean FORCE
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -47,6 +47,9 @@ docs-controllers: .venv/installed ## simulate the table of docs/controllers.md a
 
 docs-hardware: .venv/installed ## run the sweeps of docs/hardware.md, tables and pictures anew; takes minutes
 	$(BIN)/python -m benchmarks.hardware_tables --write
+
+docs-sweeps: .venv/installed ## run the sweeps of docs/batch.md and draw its pictures anew; takes minutes
+	$(BIN)/python -m benchmarks.sweep_pictures --write
 
 docs-pictures: .venv/installed ## draw the pictures of docs/architecture.md and docs/conventions.md anew
 	$(BIN)/python -m runner.report.architecture

@@ -29,6 +29,8 @@ from springline.runner.report import (
     Text,
     figure_files,
     house_style,
+    provenance,
+    shown_name,
     to_html,
     to_markdown,
 )
@@ -218,5 +220,7 @@ def _document(
         now = "; ".join(f"{item.title} {_shown(item.nominal)} {item.unit}".rstrip() for item in moved.effects)
         blocks += [Heading("Sensitivities"), Table(heads, changed, f"As it is: {now}.", labels=2)]
     blocks += [Heading("Figures"), *pictures]
-    subtitle = f"{scenario.source}, analysed by springline {__version__} from its linearised equations and its proof."
-    return Document("What the design can do", subtitle, blocks)
+    subtitle = (
+        f"{shown_name(scenario)}, analysed by springline {__version__} from its linearised equations and its proof."
+    )
+    return Document("What the design can do", subtitle, [*blocks, *provenance(scenario)])

@@ -4,10 +4,18 @@ from .document import Bullets as Bullets
 from .document import Document as Document
 from .document import Heading as Heading
 from .document import Picture as Picture
+from .document import Source as Source
 from .document import Table as Table
 from .document import Text as Text
 from .document import to_html as to_html
 from .document import to_markdown as to_markdown
+from .scale import figure_text as figure_text
+from .scale import prefixed as prefixed
+from .scale import quantity_text as quantity_text
+from .scale import unit_text as unit_text
+from .scenario_words import described as described
+from .scenario_words import provenance as provenance
+from .scenario_words import shown_name as shown_name
 from .style import COLUMN as COLUMN
 from .style import LINES as LINES
 from .style import Line as Line
@@ -19,5 +27,6 @@ from .style import figure_files as figure_files
 from .style import house_style as house_style
 from .style import label as label
 from .style import legend_above as legend_above
+from .style import name_axis as name_axis
 from .style import panels as panels
 from .style import symbol as symbol

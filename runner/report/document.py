@@ -16,6 +16,9 @@ from springline.codegen.files import render
 _SHORT = 24
 """Letters of a cell up to which its column's lines are not broken."""
 
+_LARGE = 200_000
+"""Bytes up to which an SVG is taken whatever its PNG is: it is sharp at any size."""
+
 _MARK = re.compile(r"(`[^`]+`|\*\*[^*]+\*\*|\[\[[^\]]+\]\])")
 
 
@@ -78,15 +81,35 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A figure: its file without extension (relative to the document), its SVG, and what is seen in it."""
+    """A figure: its file without extension (relative to the document), its SVG, and what is seen in it.
+
+    png  the same as pixels; a page takes it in place of an SVG that is large (a scatter of many points)
+    """
 
     kind: ClassVar[str] = "picture"
     path: str
     svg: bytes
     caption: str
+    png: bytes = b""
+
+    @property
+    def source(self) -> str:
+        """The picture as a data: address, whichever form suits a page."""
+        pixels = len(self.svg) > _LARGE and 0 < len(self.png) < len(self.svg)
+        form, data = ("png", self.png) if pixels else ("svg+xml", self.svg)
+        return f"data:image/{form};base64,{base64.b64encode(data).decode('ascii')}"
 
 
-Block = Heading | Text | Bullets | Table | Picture
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A file's text as it stands, folded away on a page."""
+
+    kind: ClassVar[str] = "source"
+    title: str
+    text: str
+
+
+Block = Heading | Text | Bullets | Table | Picture | Source
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +135,6 @@ def to_html(document: Document) -> str:
         pieces=_pieces,
         plain=_plain,
         anchor=_anchor,
-        base64=lambda data: base64.b64encode(data).decode("ascii"),
     )
 
 

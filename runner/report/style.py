@@ -10,17 +10,22 @@ from __future__ import annotations
 
 import io
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.ticker import Formatter
 from numpy.typing import NDArray
 
 from springline.model.quantities import Quantity, T
+from springline.runner.report.scale import prefixed, tick_texts, unit_text
 
 Floats = NDArray[np.float64]
 
@@ -86,7 +91,12 @@ def house_style() -> Iterator[None]:
 
 
 def panels(
-    rows: int = 1, columns: int = 1, *, width: float = COLUMN, height: float = 1.5, share_x: bool = True
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    width: float = COLUMN,
+    height: float = 1.5,
+    share_x: bool | Literal["col"] = True,
 ) -> tuple[Figure, NDArray[Any]]:
     """A figure and its (rows, columns) array of Axes; width of the figure and height of a row in inches."""
     figure = Figure(figsize=(width, height * rows + 0.5))
@@ -95,8 +105,55 @@ def panels(
 
 def label(quantity: str, unit: str) -> str:
     """Axis label "quantity [unit]", powers raised; "1" and "" are no unit."""
-    shown = unit.replace("^2", "²").replace("^3", "³").replace(" ", " · ")
-    return quantity if unit in {"", "1"} else f"{quantity} [{shown}]"
+    return quantity if unit in {"", "1"} else f"{quantity} [{unit_text(unit)}]"
+
+
+class _Scaled(Formatter):
+    """Ticks of a linear axis times a factor, all with the same decimals, and no power of ten beside the axis."""
+
+    def __init__(self, factor: float) -> None:
+        self._factor = factor
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The text of one value."""
+        return tick_texts([*self.locs, x], self._factor)[-1]
+
+    def format_ticks(self, values: Sequence[float]) -> list[str]:
+        """The texts of all ticks."""
+        self.set_locs(list(values))
+        return tick_texts(values, self._factor)
+
+
+class _Decades(Formatter):
+    """Ticks of a logarithmic axis times a factor, written out."""
+
+    def __init__(self, factor: float) -> None:
+        self._factor = factor
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The text of one value."""
+        return f"{x * self._factor:.6g}"
+
+
+def name_axis(axis: Axis, quantity: str, unit: str) -> None:
+    """Label an axis, with the SI prefix that its numbers call for ("error [mm]"): once all is drawn.
+
+    A logarithmic axis gets it too; its locator stays.
+    """
+    scale = axis.get_scale()
+    low, high = axis.get_view_interval() if scale == "log" else _limits(axis)
+    size = float(np.sqrt(low * high)) if scale == "log" else max(abs(low), abs(high))
+    factor, shown = (1.0, unit) if scale not in {"linear", "log"} else prefixed(unit, size)
+    axis.set_label_text(label(quantity, shown))
+    if factor != 1.0:
+        axis.set_major_formatter(_Scaled(factor) if scale == "linear" else _Decades(factor))
+
+
+def _limits(axis: Axis) -> tuple[float, float]:
+    """The ends of an axis, its data taken in."""
+    axes = axis.axes
+    low, high = axes.get_xlim() if axis is axes.xaxis else axes.get_ylim()
+    return float(low), float(high)
 
 
 def symbol(quantity: Quantity) -> str:
@@ -147,15 +204,13 @@ def figure_files(name: str, figure: Figure) -> dict[str, bytes]:
     Its layout is final after that.
     """
     with house_style():
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # or every file is laid out anew
-        return {
-            f"{name}.png": _saved(figure, "png", {"Software": None}),
-            f"{name}.svg": _saved(figure, "svg", {"Date": None, "Creator": None}),
-        }
-
-
-def _saved(figure: Figure, form: str, metadata: Mapping[str, str | None]) -> bytes:
-    sink = io.BytesIO()
-    figure.savefig(sink, format=form, metadata=metadata)
-    return sink.getvalue()
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            engine.execute(figure)
+            figure.set_layout_engine("none")  # or every file is laid out anew
+        # Not by savefig, which draws each file twice: once to lay it out.
+        figure.set_dpi(STYLE["savefig.dpi"])
+        pixels, vectors = io.BytesIO(), io.BytesIO()
+        FigureCanvasAgg(figure).print_png(pixels, metadata={"Software": None})  # type: ignore[no-untyped-call]
+        FigureCanvasSVG(figure).print_svg(vectors, metadata={"Date": None, "Creator": None})  # type: ignore[no-untyped-call]
+        return {f"{name}.png": pixels.getvalue(), f"{name}.svg": vectors.getvalue()}

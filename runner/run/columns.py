@@ -51,6 +51,15 @@ def metrics_table(system: System, runs: Runs) -> pa.Table:
     return pa.Table.from_arrays([*columns, status, _numbers(runs.end_time)], schema=metrics_schema(system))
 
 
+def values(column: pa.ChunkedArray) -> Floats:
+    """A column of doubles as an array, NaN for null.
+
+    Not by to_numpy, nor with a value for null unless there is one: both import pandas where that is installed.
+    """
+    parts = [np.from_dlpack(part) for part in (column.fill_null(np.nan) if column.null_count else column).chunks]
+    return np.asarray(parts[0] if len(parts) == 1 else np.concatenate([np.zeros(0), *parts]), dtype=np.float64)
+
+
 # pa.array imports pandas where that is installed, to ask whether what it is given is pandas': longer than a run takes.
 def _numbers(values: Floats, *, null: bool = False) -> pa.Array:
     """Doubles as they are, NaN as null if asked."""

@@ -7,6 +7,8 @@ import hashlib
 import numpy as np
 import pyarrow as pa
 
+from springline.runner.run.columns import values
+
 _NAN = np.uint64(0x7FF8000000000000)
 
 
@@ -19,7 +21,7 @@ def trajectory_hash(trajectory: pa.Table) -> str:
     digest = hashlib.sha256()
     for column in trajectory.columns:
         if column.type == pa.float64():
-            bits = np.array(column.fill_null(np.nan).to_numpy()).view(np.uint64)
+            bits = np.array(values(column)).view(np.uint64)
             bits[np.isnan(bits.view(np.float64))] = _NAN
             digest.update(bits.astype("<u8").tobytes())
     return digest.hexdigest()

@@ -1,5 +1,5 @@
-"""Figures of a dataset: curves over one key, maps over two, rank correlations and a scatter matrix over more; groups
-of a sweep side by side.
+"""Figures of a dataset: curves over one key, maps over two, rank correlations and metrics over each key where there are
+more; groups of a sweep side by side.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from matplotlib.figure import Figure
 
 from springline.codegen.kernel import CHATTERING
 from springline.runner.report import LINES, PAGE, house_style, legend_above, panels
-from springline.runner.sweep.influence import correlation, scatter_matrix
+from springline.runner.sweep.influence import correlation, effects, most_influential
 from springline.runner.sweep.map import metric_map, outcome_map
 from springline.runner.sweep.plan import Plan
-from springline.runner.sweep.shown import MOST_GROUPS, STOPPED, Runs, plain_decades
-from springline.runner.sweep.summary import Summary, group_names, short
+from springline.runner.sweep.shown import MOST_GROUPS, STOPPED, Runs, plain_decades, short
+from springline.runner.sweep.summary import Summary, group_names
+from springline.runner.sweep.summary import short as _text
 
 _MOST_COLUMNS = 4
 _RING: Mapping[str, Any] = {"markersize": 6, "markerfacecolor": "none", "markeredgewidth": 0.7}
@@ -24,11 +25,59 @@ _RING: Mapping[str, Any] = {"markersize": 6, "markerfacecolor": "none", "markere
 
 def summary_figures(plan: Plan, summary: Summary) -> dict[str, Figure]:
     """The figures of a dataset, by name; what there is to see decides which."""
+    runs = _shown(plan, summary)
+    figures: dict[str, Figure] = {}
+    with house_style():
+        if len(runs.keys) == 1:
+            many = len(runs.names) > MOST_GROUPS
+            figures["curve"] = _columns_of_curves(runs, _split(plan)) if many else _curve(runs)
+        elif len(runs.keys) == 2:
+            figures["map"] = metric_map(runs, "settling_time")
+            figures["error_map"] = metric_map(runs, "steady_state_error")
+            if not runs.ok.all() or runs.chattering.any():
+                figures["outcomes"] = outcome_map(runs)
+        elif runs.keys:
+            figures["correlation"] = correlation(runs)
+            figures["scatter"] = effects(runs)
+        if 1 < len(runs.names) <= MOST_GROUPS:
+            figures["groups"] = _groups(runs)
+    return figures
+
+
+_CAPTIONS: Mapping[str, str] = {
+    "curve": "What each group's runs come to over the key that varies.",
+    "map": "Settling time over the two keys.",
+    "error_map": "Steady-state error over the two keys.",
+    "outcomes": "Where commands chatter, and where runs stop.",
+    "correlation": "Which key moves what: rank correlations of each key with each metric, from −1 to 1, over the runs "
+    "that came to their end.",
+    "groups": "Share of each group's runs that settle within a time, and that end with at most an error.",
+}
+
+
+def captions(plan: Plan, summary: Summary) -> dict[str, str]:
+    """What is seen in each figure that there may be, by name."""
+    runs = _shown(plan, summary)
+    drawn = most_influential(runs) if len(runs.keys) > 2 else []
+    left = [f"`{key}`" for key in runs.keys if key not in drawn]
+    rest = f" Not drawn, for they move less: {', '.join(left)}." if drawn and left else ""
+    part = f" Of {summary.runs:,} runs {len(summary.shown):,} are drawn."
+    sample = "" if len(summary.shown) == summary.runs else part
+    said = {name: text + sample for name, text in _CAPTIONS.items()}
+    scatter = (
+        "Metrics over the keys, that which moves them most on the left; the line is the median of the runs near a "
+        "value, the band is from 10 % to 90 % of them."
+    )
+    return said | {"scatter": scatter + rest + sample}
+
+
+def _shown(plan: Plan, summary: Summary) -> Runs:
+    """The rows that figures show."""
     axes = plan.numeric_axes()
     of_groups = group_names(plan)
     names = list(dict.fromkeys(of_groups))
     group = np.searchsorted([group.first for group in plan.groups], summary.shown["run"].to_numpy(), side="right") - 1
-    runs = Runs(
+    return Runs(
         summary.shown,
         summary.units,
         plan.joints,
@@ -38,21 +87,6 @@ def summary_figures(plan: Plan, summary: Summary) -> dict[str, Figure]:
         names,
         plan.sweep.method == "grid" and len(summary.shown) == summary.runs,
     )
-    figures: dict[str, Figure] = {}
-    with house_style():
-        if len(axes) == 1:
-            figures["curve"] = _curve(runs) if len(names) <= MOST_GROUPS else _columns_of_curves(runs, _split(plan))
-        elif len(axes) == 2:
-            figures["map"] = metric_map(runs, "settling_time")
-            figures["error_map"] = metric_map(runs, "steady_state_error")
-            if not runs.ok.all() or runs.chattering.any():
-                figures["outcomes"] = outcome_map(runs)
-        elif axes:
-            figures["correlation"] = correlation(runs)
-            figures["scatter"] = scatter_matrix(runs)
-        if 1 < len(runs.names) <= MOST_GROUPS:
-            figures["groups"] = _groups(runs)
-    return figures
 
 
 def _curve(runs: Runs) -> Figure:
@@ -70,8 +104,8 @@ def _curve(runs: Runs) -> Figure:
                 axes.plot(runs[key][chosen][order], runs[column][chosen][order], label=name, **line)
             if np.any(rings := runs.chattering):
                 axes.plot(runs[key][rings], runs[column][rings], "o", color="black", label="chattering", **_RING)
-            axes.set_ylabel(runs.title(column))
             axes.set_xscale("log" if runs.logarithmic[key] else "linear")
+            runs.name(axes.yaxis, column)
     for axes in grid[-1]:
         axes.set_xlabel(runs.title(key))
     if len(runs.names) > 1 or runs.chattering.any():
@@ -82,7 +116,7 @@ def _curve(runs: Runs) -> Figure:
 def _split(plan: Plan) -> list[tuple[str, str]]:
     """Of each name of a group, what its first key is, and the others."""
     told = dict(zip(group_names(plan), (plan.told_apart(group) for group in plan.groups), strict=True))
-    words = [[f"{key.rpartition('.')[2]} = {short(value)}" for key, value in each.items()] for each in told.values()]
+    words = [[f"{key.rpartition('.')[2]} = {_text(value)}" for key, value in each.items()] for each in told.values()]
     return [(first, ", ".join(rest)) for first, *rest in words]
 
 
@@ -97,7 +131,6 @@ def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
     figure, grid = panels(len(shown), len(columns), width=PAGE, height=1.25)
     key = runs.keys[0]
     for row, column in zip(grid, shown, strict=True):
-        row[0].set_ylabel(runs.title(column).replace(" error", "\nerror"))
         for other in row[1:]:
             other.sharey(row[0])
             other.tick_params(labelleft=False, which="both")
@@ -118,6 +151,7 @@ def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
         if known.size and known.min() > 0 and known.max() > 5 * known.min():
             row[0].set_yscale("log")
             plain_decades(row[0].yaxis)
+        runs.name(row[0].yaxis, column, short(column).replace(" error", "\nerror"))
         if column.startswith("chatter"):
             for axes in row:
                 axes.axhline(CHATTERING, color="black", linewidth=0.6, label=f"chattering above {CHATTERING:g} 1/s")
@@ -150,7 +184,7 @@ def _groups(runs: Runs) -> Figure:
                 plain_decades(axes.xaxis)
             axes.set_ylim(0, 102)
             axes.margins(x=0.04)
-            axes.set_xlabel(runs.title(column))
+            runs.name(axes.xaxis, column)
             axes.set_ylabel("share of runs [%]")
     legend_above(figure)
     return figure

@@ -1,4 +1,4 @@
-"""Which keys move which metrics: rank correlations, and pairs of the most influential ones."""
+"""Which keys move which metrics: rank correlations, and the metrics over the most influential keys."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from springline.runner.report import LINES, PAGE, legend_above, panels
 from springline.runner.sweep import sampling
-from springline.runner.sweep.shown import MOST_GROUPS, PLAIN, STOPPED, Floats, Runs, short
+from springline.runner.sweep.shown import MOST_GROUPS, STOPPED, Floats, Runs, plain_decades, short
 
-_MOST_KEYS = 5
+_MOST_KEYS = 4
 _MOST_BARS = 12
 _POINTS = 800
+_BINS = 16  # parts of a key's values that each have a median
+_BAND = (0.1, 0.5, 0.9)
 
 
 def rank_correlation(x: Floats, y: Floats, group: NDArray[np.int64]) -> float:
@@ -81,65 +83,84 @@ def correlation(runs: Runs) -> Figure:
     return figure
 
 
-def scatter_matrix(runs: Runs) -> Figure:
-    """Every pair of the most influential keys and of settling time and steady-state error, runs that stopped in red."""
-    keys = _influence(_correlations(runs))[:_MOST_KEYS]
-    columns = [*keys, *(f"{m}_{joint.name}" for m in ("settling_time", "steady_state_error") for joint in runs.joints)]
-    figure, grid = panels(len(columns), len(columns), width=PAGE, height=PAGE / len(columns) - 0.06, share_x=False)
+def most_influential(runs: Runs) -> list[str]:
+    """The keys that `effects` shows, the most influential first."""
+    return _influence(_correlations(runs))[:_MOST_KEYS]
+
+
+def effects(runs: Runs) -> Figure:
+    """Settling time and steady-state error over the most influential keys, runs that stopped in red at the top.
+
+    Over the points stand the median and the band from 10 % to 90 % of the runs near a value, of one group at a time.
+    """
+    keys = most_influential(runs)
+    metrics = [f"{m}_{joint.name}" for m in ("settling_time", "steady_state_error") for joint in runs.joints]
+    figure, grid = panels(len(metrics), len(keys), width=PAGE, height=1.35, share_x="col")
     # A random choice: every k-th point of a Sobol sequence leaves holes that the sequence does not have.
     points = sampling.random(0, "points", 0, len(runs.table)) < _POINTS / max(len(runs.table), 1)
-    colors = np.array([line["color"] for line in LINES])[runs.group % len(LINES)]
-    for i, row in enumerate(columns):
-        for j, column in enumerate(columns):
-            axes = grid[i, j]
-            if j > i:
-                axes.set_visible(False)
-                continue
-            _scatter_panel(runs, axes, column, row, points, colors)
-            axes.tick_params(labelsize=4, length=1.5, pad=1)
-            if i < len(columns) - 1:
-                axes.tick_params(labelbottom=False)
-            else:
-                axes.set_xlabel(_folded(runs.title(column)), fontsize=5)
-            if j > 0 or i == 0:
-                axes.tick_params(labelleft=False)
-            if j == 0:
-                axes.set_ylabel(_folded(runs.title(row)), fontsize=5)
-    for g, name in enumerate(runs.names[:MOST_GROUPS] if len(runs.names) > 1 else []):
-        grid[0, 0].plot([], [], ".", color=LINES[g]["color"], label=name)
-    if not runs.ok.all():
-        grid[0, 0].plot([], [], "x", color=STOPPED, label="stopped early")
+    for row, metric in zip(grid, metrics, strict=True):
+        known = runs[metric][runs.ok & np.isfinite(runs[metric])]
+        for axes, key in zip(row, keys, strict=True):
+            _effect(runs, axes, key, metric, points)
+            if axes is not row[0]:
+                axes.sharey(row[0])
+                axes.tick_params(labelleft=False, which="both")
+        if known.size and _is_log(runs, metric, known):
+            row[0].set_yscale("log")
+            plain_decades(row[0].yaxis)
+        runs.name(row[0].yaxis, metric, _folded(short(metric)))
+    for axes, key in zip(grid[-1], keys, strict=True):
+        values = runs[key][np.isfinite(runs[key])]
+        if values.size and _is_log(runs, key, values):
+            axes.set_xscale("log")
+            plain_decades(axes.xaxis)
+        else:
+            axes.xaxis.set_major_locator(MaxNLocator(4))
+        axes.margins(x=0.03)
+        axes.set_xlabel(runs.title(key))
+    figure.align_ylabels()
     legend_above(figure, columns=4)
     return figure
 
 
-def _scatter_panel(
-    runs: Runs, axes: Axes, column: str, row: str, points: NDArray[np.bool_], colors: NDArray[Any]
-) -> None:
-    """One pair of columns, or on the diagonal the distribution of one."""
-    ok = runs.ok
-    x, y = runs[column], runs[row]
-    if column == row:
-        known = x[ok & np.isfinite(x)]
-        if known.size:
-            space = np.geomspace if _is_log(runs, column, known) else np.linspace
-            axes.hist(known, bins=list(space(known.min(), known.max(), 25)), color="0.6")
+def _effect(runs: Runs, axes: Axes, key: str, metric: str, points: NDArray[np.bool_]) -> None:
+    """One metric over one key: points of runs that ended well, a cross at the top for each that did not, medians."""
+    x, y, ok = runs[key], runs[metric], runs.ok
+    several = len(runs.names) > 1
+    for g, name in enumerate(runs.names[:MOST_GROUPS]):
+        chosen = (runs.group == g) & ok & np.isfinite(x) & np.isfinite(y)
+        color = LINES[g]["color"]
+        shown = chosen & points
+        axes.plot(x[shown], y[shown], ".", color=color, markersize=2.2, alpha=0.5, markeredgewidth=0, rasterized=True)
+        at, bands = _running(x[chosen], y[chosen])
+        if len(at) > 1:
+            axes.fill_between(at, bands[0], bands[2], color=color, alpha=0.15, linewidth=0)
+            line = LINES[g] if several else {"color": "black"}
+            axes.plot(at, bands[1], label=name if several else "median", **line)
+    stopped = ~ok & points & np.isfinite(x)
+    if stopped.any():
+        top = axes.get_xaxis_transform()
+        style: dict[str, Any] = {
+            "color": STOPPED,
+            "markersize": 2.5,
+            "transform": top,
+            "rasterized": True,
+            "clip_on": False,
+        }
+        axes.plot(x[stopped], np.full(stopped.sum(), 1.0), "x", label="stopped early", **style)
+
+
+def _running(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Places along x, with 10 %, 50 % and 90 % of y near each, (3, places): bins of equal numbers of runs."""
+    distinct = np.unique(x)
+    if len(distinct) <= _BINS:
+        parts = [x == value for value in distinct]
+        order = [np.flatnonzero(part) for part in parts]
     else:
-        shown, stopped = ok & points, ~ok & points
-        axes.scatter(x[shown], y[shown], s=1.2, c=colors[shown], linewidths=0, rasterized=True)
-        axes.plot(x[stopped], y[stopped], "x", color=STOPPED, markersize=1.5, rasterized=True)
-        known = y[ok & np.isfinite(y)]
-        if known.size and _is_log(runs, row, known):
-            axes.set_yscale("log")
-    known = x[ok & np.isfinite(x)]
-    if known.size and _is_log(runs, column, known):
-        axes.set_xscale("log")
-    for axis, logarithmic in ((axes.xaxis, axes.get_xscale() == "log"), (axes.yaxis, axes.get_yscale() == "log")):
-        axis.set_major_locator(LogLocator(numticks=3) if logarithmic else MaxNLocator(3))
-        axis.set_major_formatter(PLAIN)
-    axes.minorticks_off()
-    if column == row:
-        axes.set_yticks([])
+        order = [part for part in np.array_split(np.argsort(x, kind="stable"), _BINS) if part.size]
+    at = np.array([np.median(x[part]) for part in order])
+    bands = np.array([np.quantile(y[part], _BAND) for part in order]).reshape(-1, len(_BAND)).T
+    return at, bands
 
 
 def _is_log(runs: Runs, column: str, known: Floats) -> bool:
@@ -150,5 +171,5 @@ def _is_log(runs: Runs, column: str, known: Floats) -> bool:
 
 
 def _folded(text: str) -> str:
-    """A long label on several lines."""
-    return text.replace(" [", "\n[").replace("steady-state error", "steady-state\nerror")
+    """A long label on two lines."""
+    return text.replace("settling time ", "settling time\n").replace("steady-state error ", "steady-state error\n")

@@ -15,7 +15,7 @@ from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import NDArray
 
 from springline.codegen.kernel import CHATTERING
-from springline.runner.report import PAGE, label, legend_above, panels
+from springline.runner.report import PAGE, legend_above, name_axis, panels
 from springline.runner.sweep.shown import MOST_GROUPS, PLAIN, STOPPED, Floats, Runs, plain_decades, short
 
 _BINS = 40
@@ -65,12 +65,13 @@ def metric_map(runs: Runs, metric: str) -> Figure:
             bar = figure.colorbar(
                 meshes[j],
                 ax=beside.ravel().tolist(),
-                label=label(title, runs.units[column]),
                 extend="min" if any(below) else "neither",
                 **({"shrink": 0.8} if one_scale else {"location": "bottom", "shrink": 0.9}),
             )
+            long = bar.ax.yaxis if one_scale else bar.ax.xaxis
             if isinstance(scales[j], LogNorm):
-                plain_decades(bar.ax.yaxis if one_scale else bar.ax.xaxis)
+                plain_decades(long)
+            name_axis(long, title, runs.units[column])
     never = [("never settled", _NEVER)] if metric == "settling_time" else []
     stopped = [("stopped early", STOPPED)] if not runs.ok.all() else []
     for name, color in (*never, *stopped):

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from springline.model.parameters import Joint
-from springline.runner.report import label
+from springline.runner.report import label, name_axis
 from springline.runner.sweep.summary import chattering
 
 Floats = NDArray[np.float64]
@@ -50,6 +50,14 @@ class Runs:
         """Axis label of a column."""
         unit = self.units[column]
         return f"{short(column)} [{unit}]" if " or " in unit else label(short(column), unit)
+
+    def name(self, axis: Axis, column: str, text: str = "") -> None:
+        """Label an axis with a column, or with `text` for it, and the SI prefix that suits: once all is drawn."""
+        unit = self.units[column]
+        if " or " in unit:
+            axis.set_label_text(self.title(column))
+        else:
+            name_axis(axis, text or short(column), unit)
 
 
 def short(column: str) -> str:

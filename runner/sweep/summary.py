@@ -27,7 +27,7 @@ from springline.runner.sweep.quantiles import Quantiles
 Floats = NDArray[np.float64]
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-WORST = 10
+WORST, BEST = 10, 5
 
 OUTCOMES = tuple(status for status in STATUS if status != "stopped")
 CHATTERED = "chattering"
@@ -50,6 +50,7 @@ class Summary:
               those of the "ok" runs that chatter
     metrics   by column
     worst     rows of the dataset: runs that stopped, the earliest first, then those with the largest steady-state error
+    best      rows of the dataset: runs that neither stopped nor chatter, the least steady-state error first
     shown     rows for figures: all, or a random subset of a large dataset
     """
 
@@ -58,6 +59,7 @@ class Summary:
     metrics: dict[str, Distribution]
     units: dict[str, str]
     worst: list[dict[str, Any]]
+    best: list[dict[str, Any]]
     shown: pa.Table
 
     @property
@@ -94,7 +96,8 @@ def summarize(plan: Plan, dataset: Dataset, done: Collection[int] | None = None)
         row += len(picked)
     shown = pa.table([pa.array(gathered.pop(f.name), f.type, from_pandas=True) for f in plan.schema], plan.schema)
     metrics = _distributions(dataset, parts, shown, joints)
-    return Summary(runs, outcomes, metrics, units(shown), _worst(dataset, parts, metrics), shown)
+    worst, best = _extremes(dataset, parts, metrics, joints)
+    return Summary(runs, outcomes, metrics, units(shown), worst, best, shown)
 
 
 def _distributions(
@@ -116,15 +119,24 @@ def _distributions(
     return {column: Distribution(item.values(), 1.0 - item.known / runs) for column, item in quantiles.items()}
 
 
-def _worst(dataset: Dataset, parts: Sequence[str], metrics: Mapping[str, Distribution]) -> list[dict[str, Any]]:
-    """The worst rows of the dataset. Steady-state errors of several joints compare as shares of their medians."""
+def _extremes(
+    dataset: Dataset, parts: Sequence[str], metrics: Mapping[str, Distribution], joints: Sequence[Joint]
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The worst rows of the dataset, and the best.
+
+    Steady-state errors of several joints compare as shares of their medians.
+    """
     errors = {column: item for column, item in metrics.items() if column.startswith("steady_state_error_")}
     scales = {column: item.quantiles[QUANTILES.index(0.5)] or 1.0 for column, item in errors.items()}
     worst: list[tuple[float, int, dict[str, Any]]] = []
+    best: list[tuple[float, int, dict[str, Any]]] = []
     for part in parts:
-        scored = _scored(dataset.read_part(part), scales)
-        worst = heapq.nlargest(WORST, chain(worst, scored), key=lambda item: item[:2])
-    return [row for _, _, row in worst]
+        table = dataset.read_part(part)
+        badness = _badness(table, scales)
+        worst = heapq.nlargest(WORST, chain(worst, _scored(table, -badness)), key=lambda item: item[:2])
+        good = np.where(_ended(table, "ok") & ~chattering(table, joints), badness, np.nan)
+        best = heapq.nlargest(BEST, chain(best, _scored(table, good, BEST)), key=lambda item: item[:2])
+    return [row for _, _, row in worst], [row for _, _, row in best]
 
 
 def _numbers(table: pa.Table, column: str) -> Floats:
@@ -144,16 +156,20 @@ def _ended(table: pa.Table, outcome: str) -> NDArray[np.bool_]:
     return np.asarray(compute.equal(table["status"], outcome).to_numpy(), dtype=np.bool_)
 
 
-def _scored(table: pa.Table, scales: Mapping[str, float]) -> Iterator[tuple[float, int, dict[str, Any]]]:
-    """The worst rows of a part: (badness, -run, row). A run that stopped is worse than any that did not."""
+def _badness(table: pa.Table, scales: Mapping[str, float]) -> Floats:
+    """How bad each run of a part is, by its steady-state error. One that stopped is worse than any that did not."""
     error = np.zeros(len(table))
     for column, scale in scales.items():
         error = np.fmax(error, _numbers(table, column) / scale)
     end = _numbers(table, "t_end")
-    badness = np.where(_ended(table, "ok"), np.arctan(error), 10.0 + 1.0 / (1.0 + end))
-    for row in np.argsort(-badness, kind="stable")[:WORST]:
+    return np.where(_ended(table, "ok"), np.arctan(error), 10.0 + 1.0 / (1.0 + end))
+
+
+def _scored(table: pa.Table, order: Floats, most: int = WORST) -> Iterator[tuple[float, int, dict[str, Any]]]:
+    """The rows of a part with the least `order`, without those where it is NaN: (-order, -run, row)."""
+    for row in np.argsort(order, kind="stable")[: min(most, int(np.isfinite(order).sum()))]:
         content = table.slice(int(row), 1).to_pylist()[0]
-        yield float(badness[row]), -int(content["run"]), content
+        yield -float(order[row]), -int(content["run"]), content
 
 
 def _picked(chunk: Chunk, runs: int) -> NDArray[np.bool_]:

@@ -171,7 +171,7 @@ def _finish(
             print_json("batch", rows, {}, "failed" if problems else "ok")
         else:
             keys = [axis.key for axis in plan.sweep.axes]
-            keys = keys if len(keys) <= _SHOWN_KEYS else []  # summary.md has room for all
+            keys = keys if len(keys) <= _SHOWN_KEYS else []  # the report has room for all
             for header, rows_of_text in summary_tables(summary, keys):
                 print_table(header, rows_of_text, right=header[1:])
     if problems:
@@ -298,8 +298,7 @@ def replay(
     from springline.runner.cli.commands.run import OUTPUTS, print_metrics
     from springline.runner.cli.options import refuse_occupied
     from springline.runner.files import table_files, units, write_folder
-    from springline.runner.report import figure_files
-    from springline.runner.run import run_figures, simulate
+    from springline.runner.run import report_files, simulate
     from springline.runner.scenario import expect_kind
     from springline.runner.sweep import Dataset, place, recorded_run, stored_plan
 
@@ -312,9 +311,7 @@ def replay(
         complain(recorded.flaw)
     result = simulate(recorded.scenario)
     files = recorded.files(folder)
-    if plot:
-        for name, figure in run_figures(recorded.scenario, result).items():
-            files |= figure_files(f"figures/{name}", figure)
+    files |= report_files(recorded.scenario, result, plot=plot)
     files |= table_files("trajectory", result.trajectory)
     files |= table_files("metrics", result.metrics)
     write_folder(folder, files, replaces=OUTPUTS)

@@ -1,4 +1,4 @@
-"""`springline run`: one scenario simulated, its tables and figures in a folder."""
+"""`springline run`: one scenario simulated, its tables and report in a folder."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 OUTPUTS = (
     "scenario.toml",
+    "report.html",
     *(f"{table}.{form}" for table in ("trajectory", "metrics") for form in ("parquet", "csv", "units.json")),
     "figures/*.png",
     "figures/*.svg",
@@ -63,13 +64,13 @@ def run(
     force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
 ) -> None:
-    """Simulate one scenario; write its tables and figures.
+    """Simulate one scenario; write its tables and a report with figures.
 
-    Trajectory, metrics, figures and the resolved scenario go into one folder. A run that diverges is a result: it is
-    reported with the quantity and the time, and the exit code is 0.
+    report.html, trajectory, metrics, figures and the resolved scenario go into one folder. A run that diverges is a
+    result: it is reported with the quantity and the time, and the exit code is 0.
     """
     from springline.runner.files import table_files, units, write_folder
-    from springline.runner.run import simulate, trajectory_hash
+    from springline.runner.run import report_files, simulate, trajectory_hash
     from springline.runner.scenario import load_scenario, packaged_scenarios
 
     loaded = load_scenario(scenario, overrides(changes, scenario))
@@ -81,8 +82,8 @@ def run(
     with progress(f"simulating {scenario}", quiet=as_json) as report:
         result = simulate(loaded, engine=engine.value, progress=report)
     files = {"scenario.toml": loaded.to_toml(folder).encode()}
-    if plot:
-        files |= _figures(loaded, result, quiet=as_json)
+    with progress("drawing figures", quiet=as_json or not plot) as report:
+        files |= report_files(loaded, result, plot=plot, progress=report)
     files |= table_files("trajectory", result.trajectory, form.value)
     files |= table_files("metrics", result.metrics, form.value)
     write_folder(folder, files, replaces=OUTPUTS)
@@ -142,16 +143,3 @@ def print_metrics(result: Result, joints: tuple[Joint, ...]) -> None:
         )
     names = [joint.name for joint in joints]
     print_table(["metric", *names], rows, right=names)
-
-
-def _figures(scenario: Scenario, result: Result, *, quiet: bool) -> dict[str, bytes]:
-    from springline.runner.report import figure_files
-    from springline.runner.run import run_figures
-
-    files: dict[str, bytes] = {}
-    with progress("drawing figures", quiet=quiet) as report:
-        figures = run_figures(scenario, result)
-        for done, (name, figure) in enumerate(figures.items(), 1):
-            files |= figure_files(f"figures/{name}", figure)
-            report(done / len(figures))
-    return files

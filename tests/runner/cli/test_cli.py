@@ -41,7 +41,7 @@ from springline.runner.run import simulate
 from springline.runner.scenario import load_scenario, packaged_scenarios, packaged_sweeps
 
 MAIN = "from springline.runner.cli import main; main()"
-FIGURES = {"tracking", "error", "force", "sliding", "springs", "steady_state", "base_motion", "tip"}
+FIGURES = {"tracking", "error", "phase_plane", "sliding", "force", "springs", "base_motion", "tip"}
 SHORT = """\
 [base_motion]
 kind = "sine"
@@ -113,7 +113,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_run_writes_scenario_tables_and_figures(results: Path) -> None:
     figures = {f"figures/{name}.{form}" for name in FIGURES for form in ("png", "svg")}
-    assert set(contents(results)) == {"scenario.toml", "trajectory.parquet", "metrics.parquet"} | figures
+    always = {"report.html", "scenario.toml", "trajectory.parquet", "metrics.parquet"}
+    assert set(contents(results)) == always | figures
 
 
 def test_run_stores_what_simulate_gives_with_units(results: Path) -> None:
@@ -142,7 +143,9 @@ def test_another_process_writes_the_same_bytes(results: Path) -> None:
 def test_the_engines_write_the_same_bytes(results: Path) -> None:
     done("run", "short.toml", "-o", "casadi", "--engine", "casadi", "--no-plot")
     written = contents(Path("casadi"))
-    assert set(written) == {"scenario.toml", "trajectory.parquet", "metrics.parquet"}
+    assert set(written) == {"report.html", "scenario.toml", "trajectory.parquet", "metrics.parquet"}
+    assert "<img" not in Path("casadi/report.html").read_text(encoding="utf-8")
+    del written["report.html"]
     assert written.items() <= contents(results).items()
 
 
@@ -195,7 +198,7 @@ def test_set_overrides_the_scenario() -> None:
 def test_csv_has_the_same_numbers_and_units_beside_it(results: Path) -> None:
     done("run", "short.toml", "-o", "out", "--no-plot", "--format", "csv")
     tables = {f"{name}.{end}" for name in ("trajectory", "metrics") for end in ("csv", "units.json")}
-    assert set(contents(Path("out"))) == {"scenario.toml"} | tables
+    assert set(contents(Path("out"))) == {"report.html", "scenario.toml"} | tables
     for name in ("trajectory", "metrics"):
         read, expected = read_table(Path("out", f"{name}.csv")), read_table(results / f"{name}.parquet")
         assert read.equals(expected)
@@ -282,6 +285,7 @@ def test_force_replaces_results_and_only_results(results: Path) -> None:
         "trajectory.units.json",
         "metrics.csv",
         "metrics.units.json",
+        "report.html",
     }
     assert set(contents(Path("out"))) == left
     assert not Path("out/figures").exists()

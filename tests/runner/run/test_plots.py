@@ -13,7 +13,7 @@ from springline.runner.report import figure_files, house_style
 from springline.runner.run import Result, run_figures, simulate
 from springline.runner.scenario import Scenario, load_scenario
 
-ALWAYS = {"tracking", "error", "force", "sliding", "springs", "tip"}
+ALWAYS = {"tracking", "error", "phase_plane", "sliding", "force", "springs", "tip"}
 
 Run = tuple[Scenario, Result]
 
@@ -39,12 +39,12 @@ def diverged() -> Run:
 
 
 def test_figures_of_a_run(at_rest: Run) -> None:
-    assert set(run_figures(*at_rest)) == ALWAYS | {"steady_state"}
+    assert set(run_figures(*at_rest)) == ALWAYS
 
 
 def test_what_a_run_does_not_have_has_no_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     rigid = simulated("paper/nominal", simulation__duration=0.1, drive__kind="rigid")
-    assert set(run_figures(*rigid)) == ALWAYS - {"springs"} | {"steady_state"}
+    assert set(run_figures(*rigid)) == ALWAYS - {"springs"}
 
     class Proportional(Controller):
         def control(self, r: Values, y: Values, z: Values, model: ArmModel, p: Values) -> Control:
@@ -52,14 +52,14 @@ def test_what_a_run_does_not_have_has_no_figure(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setitem(CONTROLLERS, "proportional", Proportional())
     run = simulated("paper/nominal", simulation__duration=0.1, control__controller="proportional")
-    assert set(run_figures(*run)) == ALWAYS - {"sliding"} | {"steady_state"}
+    assert set(run_figures(*run)) == ALWAYS - {"sliding", "phase_plane"}
 
 
 def test_a_recorded_base_motion_is_set_against_the_error(at_sea: Run) -> None:
     figures = run_figures(*at_sea)
-    assert set(figures) == ALWAYS | {"steady_state", "base_motion", "error_over_base", "error_against_base"}
+    assert set(figures) == ALWAYS | {"base_motion", "error_over_base", "error_against_base"}
     assert [axes.get_ylabel() for axes in figures["base_motion"].axes] == [
-        "heave [m]", "pitch [rad]", "roll [rad]", "surge [m]", "sway [m]", "yaw [rad]",
+        "heave [m]", "pitch [mrad]", "roll [mrad]", "surge [m]", "sway [m]", "yaw [mrad]",
     ]  # fmt: skip
     assert len(figures["error_against_base"].axes) == 2 * 6
 
@@ -96,10 +96,36 @@ def test_a_run_that_starts_on_its_reference_has_no_bands() -> None:
 
 def test_tracking_shows_link_and_reference(at_rest: Run) -> None:
     scenario, result = at_rest
-    lift = run_figures(scenario, result)["tracking"].axes[0]
+    start, whole = run_figures(scenario, result)["tracking"].axes[:2]
+    assert start.get_title() == "the first 0.375 s" and whole.get_title() == "the whole run"
+    lift = whole
     drawn = {line.get_label(): line.get_ydata() for line in lift.lines}
     assert np.array_equal(drawn["link q₁"], result.trajectory["q1_lift"].to_numpy())
     assert np.array_equal(drawn["reference"], result.trajectory["q1d_lift"].to_numpy())
+
+
+def test_what_is_left_of_the_error_has_a_scale_of_its_own(at_rest: Run) -> None:
+    """In the unit that suits it; the start does not fix the scale."""
+    start, rest = run_figures(*at_rest)["error"].axes[:2]
+    assert start.get_ylabel() == "lift\nerror e [m]" and rest.get_ylabel() == "error e [mm]"
+    assert start.get_ylim()[0] < -0.79 and rest.get_ylim()[0] > -1e-2
+    worst = at_rest[1].metrics["steady_state_error_lift"][0].as_py()
+    limits = [line.get_ydata()[0] for line in rest.lines if line.get_label() == "± steady-state error"]
+    assert limits == [-worst, worst]
+    assert all(text.get_text() == "" or "e" not in text.get_text() for text in rest.yaxis.get_ticklabels())
+
+
+def test_the_surface_is_where_sigma_is_zero(at_rest: Run) -> None:
+    """It is drawn where error and rate alone decide sigma; once there, the run stays on it."""
+    axes = run_figures(*at_rest)["phase_plane"].axes[0]
+    (surface,) = axes.collections[-1].get_paths()
+    run = next(line for line in axes.lines if line.get_label() == "run")
+    e, de = run.get_xdata(), run.get_ydata()
+    assert (e[0], de[0]) == pytest.approx((-0.8, np.pi))
+    order = np.argsort(surface.vertices[:, 0])
+    near = np.interp(e, *surface.vertices[order].T)
+    late = (np.abs(e) < 0.1) & (np.abs(e) > 0.02)
+    assert late.sum() > 20 and np.max(np.abs(near - de)[late]) < 0.05
 
 
 def legend_names(figure: Figure) -> list[str]:

@@ -388,12 +388,21 @@ def test_batch_writes_a_dataset_with_its_summary(sweep: Path, tmp_path: Path, co
     done = command("batch", sweep, "-o", folder)
     assert done.exit_code == 0, done.output
     assert "settling_time_lift" in done.stdout
-    assert {"sweep.json", "summary.md", "map.png", "map.svg", "part-000000.parquet"} <= {
+    assert {"sweep.json", "report.html", "report.md", "map.png", "map.svg", "part-000000.parquet"} <= {
         f.name for f in folder.iterdir()
     }
-    text = (folder / "summary.md").read_text(encoding="utf-8")
-    assert "![map](map.png)" in text
-    assert "300 of 300 runs" in text
+    text = (folder / "report.md").read_text(encoding="utf-8")
+    assert "](map.png)" in text
+    assert "300 of 300 runs" in text and "**All 300 runs came to their end**, none of these chatters." in text
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("<img ") == 2 and not re.search(r"https?://|<script|<link", page) and len(page) < 3_000_000
+    assert str(tmp_path) not in page + text
+    best = summarize(stored_plan(Dataset(place(folder))), Dataset(place(folder))).best
+    rows = read_dataset(folder).to_pylist()
+    scales = {c: np.median([row[c] for row in rows]) for c in rows[0] if c.startswith("steady_state_error_")}
+    ranked = sorted(rows, key=lambda row: max(row[c] / scale for c, scale in scales.items()))
+    assert [row["run"] for row in best] == [row["run"] for row in ranked[:5]]
+    assert f"`springline replay DIR {ranked[0]['run']}`" in text
     stored = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
     assert (stored["runs"], stored["chunk"], len(stored["groups"])) == (300, 64, 1)
     assert re.fullmatch("[0-9a-f]{64}", stored["groups"][0]["kernel"])
@@ -684,7 +693,8 @@ def test_chattering_runs_are_counted_and_marked(keys: int, tmp_path: Path, comma
     assert summary.outcomes["fast = false"]["chattering"] == 0
     assert summary.stopped == 4 * keys
     assert re.search(rf"fast = true +{4 * keys} +{4 * keys} +{2 * keys} ", done.stdout)
-    text = (tmp_path / "data" / "summary.md").read_text()
+    text = (tmp_path / "data" / "report.md").read_text()
+    assert f"of these chatter. Of the others {4 * keys} " in text
     assert f"| fast = true | {4 * keys} | {4 * keys} | {2 * keys} | 0 | 0 |" in text
     figures = summary_figures(plan, summary)
     if keys == 1:

@@ -1,0 +1,70 @@
+"""The pictures of docs/batch.md: packaged sweeps, run whole.
+
+    python -m benchmarks.sweep_pictures [--write]
+
+Runs each sweep in a folder of its own; --write (`make docs-sweeps`) puts its picture into docs/images/.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from springline.runner.sweep import (
+    Dataset,
+    Plan,
+    load_sweep,
+    open_pool,
+    place,
+    run_sweep,
+    summarize,
+    versions,
+    write_summary,
+)
+
+IMAGES = Path(__file__).parents[1] / "docs" / "images"
+
+SHOWN: Mapping[str, str] = {
+    "gains": "scatter",
+    "laws": "groups",
+    "payload_and_phase": "scatter",
+    "stability_map": "map",
+}
+"""Name of a packaged sweep -> which of its figures the page shows."""
+
+
+def picture(name: str, folder: Path) -> bytes:
+    """Run a packaged sweep into a folder: its picture as PNG."""
+    plan = Plan(load_sweep(name))
+    dataset = Dataset(place(str(folder)))
+    dataset.begin(plan, versions(), resume=False)
+    with open_pool(None, "") as pool:
+        tally = run_sweep(plan, dataset, pool, set())
+    if tally.left:
+        raise RuntimeError(f"{name}: {tally.left} runs are missing: {tally.failures}")
+    write_summary(plan, dataset, summarize(plan, dataset))
+    return (folder / f"{SHOWN[name]}.png").read_bytes()
+
+
+def main() -> int:
+    """Command line; the exit code is 2 where there is no folder for pictures."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--write", action="store_true", help="put the pictures into docs/images/")
+    write = parser.parse_args().write
+    if write and not IMAGES.is_dir():
+        parser.error(f"there is no {IMAGES}: run it in a checkout")
+    for name in SHOWN:
+        with tempfile.TemporaryDirectory() as folder:
+            content = picture(name, Path(folder) / name)
+        sys.stdout.write(f"{name}: {len(content)} bytes\n")
+        sys.stdout.flush()
+        if write:
+            (IMAGES / f"sweep_{name}.png").write_bytes(content)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
