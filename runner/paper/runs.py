@@ -22,6 +22,7 @@ from springline.runner.files import InputError, Problem
 from springline.runner.paper.cases import LAWS, cases
 from springline.runner.paper.evidence import Evidence, Inherent
 from springline.runner.paper.measured import Floats, Measured
+from springline.runner.paper.numbers import exact
 from springline.runner.run import Crew, Progress, Result, results, simulate, trajectory_table
 from springline.runner.scenario import Scenario, load_scenario
 
@@ -71,7 +72,7 @@ LAYERS: Mapping[str, Experiment] = {
 """Width of the boundary layer, base at rest."""
 
 LIMITS: Mapping[str, Experiment] = {
-    f"{a_max:g}": Experiment(f"a_max = {a_max:g}", "paper/nominal", {"control.a_max": a_max})
+    f"{a_max:g}": Experiment(f"a_max = {exact(a_max)}", "paper/nominal", {"control.a_max": a_max})
     for a_max in (50.0, 100.0, 200.0, 500.0, 1000.0, 1500.0, float("inf"))
 }
 """Limit on the reaching law, base at rest."""
