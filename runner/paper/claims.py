@@ -127,12 +127,12 @@ def _ranking(evidence: Evidence) -> Judgement:
             text = f"settling time, {joint}: {LAWS[law]} / variable power log"
             stays = printed[f"paper/group2_{law}"]["steady_state_error"][i]
             share = stays / abs(float(evidence.law(law)[f"e_{joint}"][0]))
-            beyond = f", and its steady-state error is {percent(share)} of the initial error, outside ours"
+            beyond = f", and the error that it prints as steady is {percent(share)} of the initial one, outside ours"
             beyond = beyond if share > SETTLED else ""
             numbers.append(Number(text, ratio, "", wanted))
             checks.append(
                 Check(
-                    f"{text} is within 30 % of the printed {wanted:.2g}",
+                    f"{text} is within 30 % of the printed {wanted:.3g}",
                     0.7 <= ratio / wanted <= 1.3,
                     f"it is {number(ratio, 2)}; the bands that the paper settles into are not published{beyond}",
                 )
@@ -383,9 +383,12 @@ def _bounds(evidence: Evidence) -> Judgement:
             Check(
                 f"{case.name}: k1 − S̄0 > 0, so that there is a bound",
                 theory.margin.holds,
-                "the base oscillation asks for more acceleration than k1 gives; that the run settles all the "
-                "same is due to the "
-                "terms with k2 and k3, which the proof leaves out",
+                "the base oscillation asks for more acceleration than k1 gives"
+                + (
+                    "; that the run settles is due to the terms with k2 and k3, which the proof leaves out"
+                    if kept
+                    else ""
+                ),
             ),
             Check(f"{case.name}: both joints settle, no later than any bound there is", kept),
         ]

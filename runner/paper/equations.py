@@ -15,18 +15,18 @@ _TEX: Mapping[str, str] = {
     "11": r"\frac{d^2 \eta}{d \tau^2} + K_1 (M_2^{-1} + M_1^{-1})\, \eta = K_1 M_2^{-1} U_f",
     "14": r"U_s = H (\ddot{q}_{1d} - u_e) + C \dot{q}_1 + G, \quad H = M_1 + M_2",
     "16": r"\ddot{e} = u_e - H^{-1} S",
-    "18": rf"\dot{{\sigma}} = -k_1 f(\sigma) - k_2 {_LOG}^{{1+\alpha}} \, \operatorname{{sgn}} \sigma "
-    rf"- k_3 {_LOG}^{{1-\alpha}} \, \operatorname{{sgn}} \sigma",
-    "19": r"f(\sigma) = |\sigma|^{\zeta \max(1, |\sigma|)} \, \operatorname{sgn} \sigma",
-    "20": r"\dot{\sigma} = -k_1 |\sigma|^\alpha \, \operatorname{sgn} \sigma",
-    "21": r"\dot{\sigma} = -k_1 |\sigma|^\alpha \, \operatorname{sgn} \sigma "
-    r"- k_2 |\sigma|^\beta \, \operatorname{sgn} \sigma",
+    "18": rf"\dot{{\sigma}} = -k_1 f(\sigma) - k_2 {_LOG}^{{1+\alpha}} \, \operatorname{{sgn}}\, \sigma "
+    rf"- k_3 {_LOG}^{{1-\alpha}} \, \operatorname{{sgn}}\, \sigma",
+    "19": r"f(\sigma) = |\sigma|^{\zeta \max(1, |\sigma|)} \, \operatorname{sgn}\, \sigma",
+    "20": r"\dot{\sigma} = -k_1 |\sigma|^\alpha \, \operatorname{sgn}\, \sigma",
+    "21": r"\dot{\sigma} = -k_1 |\sigma|^\alpha \, \operatorname{sgn}\, \sigma "
+    r"- k_2 |\sigma|^\beta \, \operatorname{sgn}\, \sigma",
     "22": r"\sigma = \dot{e} + \mu\, e^{l/m} + \lambda\, e^{p/r}",
     "25": r"u_e = \dot{\sigma} - \mu \frac{l}{m} |e|^{(l-m)/m}\, \dot{e} - \lambda \frac{p}{r} |e|^{(p-r)/r}\, \dot{e}",
     "32": r"t_a = t_{s\,\mathrm{max}} + t_q",
     "33": r"U_f = K_f (\dot{q}_1 - \dot{q}_2), \quad U = U_s + U_f",
     # Those without a number
-    "Theorem 1": r"t_{s\,\mathrm{max}} = \frac{1}{\mu} \frac{m}{l - m} + \frac{1}{\lambda} \frac{r}{r - p}",
+    "Theorem 1": r"t_{s\,\mathrm{max}} = \frac{1}{\mu}\, \frac{m}{l - m} + \frac{1}{\lambda}\, \frac{r}{r - p}",
     "reaching": r"t_q = \frac{2\, V(\sigma(0))^{(1-\zeta)/2}}{c_1\, 2^{(\zeta+1)/2} (1 - \zeta)}, \quad "
     r"V = \frac{|\sigma|^2}{2}, \quad k_1 - \bar{S}_0 \geq c_1 > 0",
     "layer": r"e^{p/r} \rightarrow e\, (e^2 + \delta^2)^{(p/r - 1)/2}",

@@ -348,9 +348,7 @@ FIGURES: tuple[PaperFigure, ...] = (
     ),
     *_group_figures(8, 1, "variable power log law under each oscillation", _FOUR, partial(_group, 1)),
     *_group_figures(12, 2, "the three laws under shake", _FOUR, partial(_group, 2)),
-    *_group_figures(
-        16, 3, "payload of the plant changed, of the controller not, under shake", _SIX, partial(_group, 3)
-    ),
+    *_group_figures(16, 3, "payload of the plant alone changed, under shake", _SIX, partial(_group, 3)),
     *_group_figures(22, 4, "fast control on and off, under shake", _FOUR, _flutter),
 )
 

@@ -350,8 +350,8 @@ def _tested(claim: int, shown: dict[str, int]) -> list[Block]:
         if name in shown:
             places.setdefault(shown[name], []).append(equation(name).label)
     shown |= dict.fromkeys(new, claim)
-    old = ", ".join(f"{', '.join(dict.fromkeys(labels))} at claim {at}" for at, labels in places.items())
-    text = f"{tested.intro}{f' – {old}' if old else ''}{':' if new else '.'}"
+    old = ", ".join(f"{', '.join(dict.fromkeys(labels))} see claim {at}" for at, labels in places.items())
+    text = f"{tested.intro}{f'; for {old}' if old else ''}{':' if new else '.'}"
     return [Text(text), *equations(new)]
 
 

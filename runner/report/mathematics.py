@@ -182,6 +182,8 @@ def _mathml(node: _Node) -> str:
             return f"<mn>{text}</mn>"
         case _Leaf("operator", "|"):
             return '<mo stretchy="false" lspace="0" rspace="0">|</mo>'
+        case _Leaf("operator", "/"):
+            return '<mo lspace="0" rspace="0">/</mo>'
         case _Leaf("operator", "(" | ")" | "[" | "]" as fence):
             return f'<mo stretchy="false">{fence}</mo>'
         case _Leaf("operator", text) if text in _SPACES:
