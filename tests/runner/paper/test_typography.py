@@ -35,7 +35,7 @@ def test_a_text_in_plain_letters_is_set(written: str, shown: str) -> None:
 
 
 def test_every_symbol_can_be_set_on_a_page_and_in_a_figure() -> None:
-    parser: MathTextParser[object] = MathTextParser("path")
+    parser = MathTextParser("path")
     for written, tex in SYMBOLS.items():
         parser.parse(f"${tex}$")
         assert typeset(written) == f"${tex}$"
