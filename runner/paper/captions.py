@@ -44,7 +44,7 @@ def sea(study: Study) -> str:
     low, high = SEA_STATE_6
     said = (
         f"Our shake accelerates the base by {number(heave, 2)} m/s² RMS, of which its terms have "
-        f"{' and '.join(number(part, 2) for part in parts) or 'none'}"
+        f"{' and '.join(f'{number(part, 2)} m/s²' for part in parts) or 'none'}"
     )
     vessel = (
         f"a vessel of 83 m has {low:g} (head seas) to {high:g} m/s² (beam seas) at a significant wave height of 5 m"
@@ -126,13 +126,13 @@ def _without(quantity: str, unit: str) -> Callable[[Study], str]:
         first, last = (number(float(np.max(part)), 1) for part in (gap[: rows // 10], gap[-(rows // 10) :]))
         ends = "leaves its bound" if off.status != "ok" else "ends"
         text = (
-            f"The run without fast control {ends} at {number(off.end, 2)} s; its distance to the other is {first} at "
-            f"most in the first tenth of that time, {last} {unit} in the last"
+            f"The run without fast control {ends} at {number(off.end, 2)} s; its distance to the other is {first} "
+            f"{unit} at most in the first tenth of that time, {last} {unit} in the last"
         )
         if "vel" not in quantity:
             return f"{text}."
         rate, frequency = growth(off["t"][:rows], off[column][:rows] - on[column][:rows])
-        return f"{text}, and grows at {number(rate, 2)} 1/s with {number(frequency)} Hz."
+        return f"{text}. Over the second half it grows at {number(rate, 2)} 1/s, with {number(frequency)} Hz."
 
     return sentence
 
@@ -172,16 +172,15 @@ def _readings(study: Study) -> str:
 
 
 def _two_numbers(study: Study) -> str:
-    found = []
+    found, others = [], []
     for symbol, runs in (("δ", study.layers), ("a_max", study.limits)):
         errors = {key: run.metric("steady_state_error", "lift") for key, (run, _) in runs.items()}
         least = min((error for error in errors.values() if math.isfinite(error)), default=math.nan)
         calm = [key for key, error in errors.items() if error < 10 * least]
         found.append(f"{symbol} from {calm[0]} to {calm[-1]}" if calm else f"no {symbol}")
-    return (
-        f"Of the values tried, those that leave an error of less than ten times the least are {' and '.join(found)}; "
-        "beyond them the springs take part."
-    )
+        others += [error for key, error in errors.items() if key not in calm and math.isfinite(error)]
+    rest = f"; the others leave up to {number(max(others), 2)} m, or diverge" if others else ""
+    return f"Of the values tried, those that leave less than ten times the least error are {' and '.join(found)}{rest}."
 
 
 def _always(text: str) -> Callable[[Study], str]:

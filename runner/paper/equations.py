@@ -31,7 +31,7 @@ _TEX: Mapping[str, str] = {
     r"V = \frac{|\sigma|^2}{2}, \quad k_1 - \bar{S}_0 \geq c_1 > 0",
     "layer": r"e^{p/r} \rightarrow e\, (e^2 + \delta^2)^{(p/r - 1)/2}",
     "linear": r"\sigma = \dot{e} + c\, e",
-    "Runge-Kutta": r"|R(\mathrm{i} \omega h)|^2 = 1 - \frac{(\omega h)^6}{72} + \frac{(\omega h)^8}{576}",
+    "Runge-Kutta": r"\frac{E(t + h)}{E(t)} = 1 - \frac{(\omega h)^6}{72} + \frac{(\omega h)^8}{576}",
 }
 """Number in the paper, or a name where it has none -> TeX."""
 

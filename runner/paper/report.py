@@ -474,7 +474,7 @@ def _left_open(study: Study, svg: Mapping[str, bytes]) -> list[Block]:
         held between:"""),
         Table(_SAMPLED, _sampled(study.sampling), labels=1, words=(3,)),
         _prose(r"""Without fast control the springs are not damped: they flutter (claim 8), and how long a run lasts
-        depends on what hides that. A solver's step can: a step $h$ of RK4 multiplies the energy of an undamped
+        depends on what hides that. A solver's step can: a step $h$ of RK4 changes the energy $E$ of an undamped
         oscillation at $\omega$ by"""),
         equation("Runge-Kutta"),
         _prose(_by_the_solver(study)),
@@ -509,7 +509,7 @@ def _by_the_solver(study: Study) -> str:
             f"of the {joint} ({number(frequency)} Hz) at {number(decay, 2)} 1/s, where with a fine step it grows at "
             f"{number(rate, 2)} 1/s"
         )
-    return f"With $h$ = {exact(1e3 * h)} ms that alone damps claim 8's flutter {' and '.join(said)}."
+    return f"With $h$ = {exact(1e3 * h)} ms that alone damps claim 8's flutter {'; that '.join(said)}."
 
 
 _SAMPLED = ("", f"lift's velocity above {CHATTER_ABOVE:g} Hz, RMS [m/s]", "half the step [m/s]", "")

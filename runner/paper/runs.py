@@ -53,7 +53,7 @@ class Experiment:
 
 LITERAL: Mapping[str, Experiment] = {
     "unlimited": Experiment("δ = 0, no limits", "paper/as_printed", {}),
-    "limited": Experiment("δ = 0, a_max = 200", "paper/as_printed", {"control.a_max": 200.0}),
+    "limited": Experiment("δ = 0, a_max = 200 m/s², rad/s²", "paper/as_printed", {"control.a_max": 200.0}),
 }
 """The law as it is printed: no boundary layer."""
 
@@ -89,9 +89,9 @@ SAMPLING: Mapping[str, Experiment] = {
 """The three laws under shake with sampled control (E11). Periods are multiples of the scenarios' step and its half."""
 
 SOLVER: Mapping[str, Experiment] = {
-    "fine": Experiment("a_max = 50, step 0.1 ms", "paper/group4_fast_off", {"control.a_max": 50.0}),
+    "fine": Experiment("a_max = 50 m/s², rad/s², step 0.1 ms", "paper/group4_fast_off", {"control.a_max": 50.0}),
     "coarse": Experiment(
-        "a_max = 50, step 1 ms", "paper/group4_fast_off", {"control.a_max": 50.0, "simulation.step": 1e-3}
+        "a_max = 50 m/s², rad/s², step 1 ms", "paper/group4_fast_off", {"control.a_max": 50.0, "simulation.step": 1e-3}
     ),
     "motors": Experiment(
         "motors limited to 2000 N and 5000 N m instead of the law, step 0.1 ms",

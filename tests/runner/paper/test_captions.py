@@ -65,10 +65,10 @@ def test_how_far_a_run_without_fast_control_leaves_the_other() -> None:
     runs = {"paper/group4_fast_on": run(), "paper/group4_fast_off": run(gap=1e-3, end=401)}
     position, velocity = (SEEN[f"figure_{number}"](study(runs)) for number in (22, 25))
     assert position == (
-        "The run without fast control leaves its bound at 0.40 s; its distance to the other is 0.002 at most in the "
+        "The run without fast control leaves its bound at 0.40 s; its distance to the other is 0.002 m at most in the "
         "first tenth of that time, 3 m in the last."
     )
-    assert velocity.endswith("3 rad/s in the last, and grows at 20 1/s with 100 Hz.")
+    assert velocity.endswith("3 rad/s in the last. Over the second half it grows at 20 1/s, with 100 Hz.")
 
 
 @pytest.mark.parametrize(("heave", "worst"), [(2.0, True), (0.5, False)])

@@ -517,7 +517,9 @@ def test_the_base_motion_of_a_group_is_named(tmp_path: Path, monkeypatch: pytest
     text = (tmp_path / "out/report.md").read_text(encoding="utf-8")
     assert "shake of group 1): shake (1.5 sin(1.5t) + 0.03 sin(10t)) m" in text
     assert "roll of group 1): roll 15 sin(0.7t) °" in text
-    assert "accelerates the base by 3.2 m/s² RMS, of which its terms have 2.4 and 2.1: a worst case" in text  # E14
+    assert (
+        "accelerates the base by 3.2 m/s² RMS, of which its terms have 2.4 m/s² and 2.1 m/s²: a worst case" in text
+    )  # E14
     assert "More than the 0.5 s of a run" in text
 
 
