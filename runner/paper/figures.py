@@ -77,7 +77,7 @@ def _entitle(figure: Figure, title: str) -> None:
     assert isinstance(engine, ConstrainedLayoutEngine)  # of the house style
     room = 0.0
     for legend in figure.legends:  # one that is told where to stand is left out of the layout
-        room = legend.get_tightbbox().height / figure.dpi + 2 * engine.get()["h_pad"]
+        room = legend.get_window_extent().height / figure.dpi + 2 * engine.get()["h_pad"]
         legend.set_bbox_to_anchor((0, 0, 1, top), figure.transFigure)
     engine.set(rect=(0, 0, 1, top - room / (height + _TITLE)))
     figure.text(0.08 / width, 1 - 0.08 / (height + _TITLE), typeset(title), fontsize=8.5, weight="bold", va="top")
