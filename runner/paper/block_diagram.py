@@ -34,10 +34,10 @@ def block_diagram() -> Figure:
 def _blocks(axes: Axes) -> None:
     _block(axes, (0.75, 4.9), (1.15, 1.0), "reference", _SOURCE)
     _block(axes, (3.75, 4.9), (1.15, 0.95), "surface\n$\\sigma(e,\\ \\dot{e})$", _SLOW)
-    _block(axes, (5.45, 4.9), (1.4, 0.95), "reaching law\nwithin $\\pm a_{max}$", _SLOW)
+    _block(axes, (5.45, 4.9), (1.4, 0.95), "reaching law\nwithin $\\pm a_\\mathrm{max}$", _SLOW)
     _block(axes, (7.9, 4.9), (1.5, 0.95), "computed\ntorque $H, C, G$", _SLOW)
     _block(axes, (10.65, 3.75), (1.6, 0.82), "fast control\n$K_f\\,(\\dot{q}_1 - \\dot{q}_2)$", _FAST)
-    _block(axes, (11.75, 4.9), (1.0, 0.8), "limit\n$\\pm U_{max}$", _SOURCE)
+    _block(axes, (11.75, 4.9), (1.0, 0.8), "limit\n$\\pm U_\\mathrm{max}$", _SOURCE)
     _block(axes, (12.3, 2.35), (1.2, 0.8), "motor\n$M_2$", _PLANT)
     _block(axes, (10.65, 2.35), (1.0, 0.8), "spring\n$K$", _PLANT)
     _block(axes, (9.05, 2.35), (1.2, 0.8), "arm\n$M_1, C, G$", _PLANT)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from springline.model.base import PAPER_COORDINATES
 from springline.model.mechanisms import MECHANISMS
@@ -23,7 +24,9 @@ from springline.model.quantities import DQ1, DQ1D, Q1, Q1D, SIGMA, E, Quantity
 from springline.runner.paper.block_diagram import block_diagram
 from springline.runner.paper.cases import CASES, LAWS
 from springline.runner.paper.measured import Measured
+from springline.runner.paper.numbers import number as told
 from springline.runner.paper.runs import LAYERS, LIMITS, LINEAR_GAIN, Study
+from springline.runner.paper.symbols import typeset
 from springline.runner.report import LINES, PAGE, REFERENCE, TIME, Line, draw, house_style, label, legend_above
 
 Curves = Sequence[tuple[str, Measured, Line]]
@@ -31,24 +34,53 @@ Curves = Sequence[tuple[str, Measured, Line]]
 
 @dataclass(frozen=True, slots=True)
 class PaperFigure:
-    """A figure: its file name without extension, its caption, and how it is drawn from a study.
+    """A figure: its file name without extension, its number and title, and how it is drawn from a study.
 
-    group  the group of Table 2 that it shows, None for a figure that only the whole reproduction has
+    group   the group of Table 2 that it shows, None for a figure that only the whole reproduction has
+    remark  what to know besides, a sentence below the figure; "" for nothing
     """
 
     name: str
-    caption: str
+    number: str
+    title: str
     group: int | None
     draw: Callable[[Study], Figure]
+    remark: str = ""
+
+    @property
+    def caption(self) -> str:
+        """Number, title and remark, for below the figure."""
+        return f"**Figure {self.number}.** {self.title}. {self.remark}".rstrip()
 
     def possible(self, study: Study) -> bool:
         """Whether the study holds what is shown."""
         return study.whole if self.group is None else self.group in study.groups
 
     def make(self, study: Study) -> Figure:
-        """The figure in the house style."""
+        """The figure in the house style, with its number and title inside, so that its file can be shown alone."""
         with house_style():
-            return self.draw(study)
+            figure = self.draw(study)
+            _entitle(figure, f"Figure {self.number}. {self.title}")
+            return figure
+
+
+_TITLE = 0.24
+"""Height of a title inside a figure, inches."""
+
+
+def _entitle(figure: Figure, title: str) -> None:
+    """Put a title above axes and legend: the figure grows, and nothing in it changes its size."""
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(width, height + _TITLE)
+    top = height / (height + _TITLE)
+    engine = figure.get_layout_engine()
+    assert isinstance(engine, ConstrainedLayoutEngine)  # of the house style
+    room = 0.0
+    for legend in figure.legends:  # one that is told where to stand is left out of the layout
+        room = legend.get_window_extent().height / figure.dpi + 2 * engine.get()["h_pad"]
+        legend.set_bbox_to_anchor((0, 0, 1, top), figure.transFigure)
+    engine.set(rect=(0, 0, 1, top - room / (height + _TITLE)))
+    figure.text(0.08 / width, 1 - 0.08 / (height + _TITLE), typeset(title), fontsize=8.5, weight="bold", va="top")
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +190,9 @@ def _flutter(shown: Shown) -> Callable[[Study], Figure]:
             draw(axes, off["t"], off[shown.column], off_name, **_solid(off_line, 0.6))
             draw(axes, on["t"], on[shown.column], on_name, **on_line)
             draw(axes, on["t"], on[shown.desired], "desired", **REFERENCE)
-            axes.axvline(off.end, color="0.4", linewidth=0.8, linestyle=":", label=f"left its bound, {off.end:.2f} s")
+            axes.axvline(
+                off.end, color="0.4", linewidth=0.8, linestyle=":", label=f"left its bound, {told(off.end, 2)} s"
+            )
             axes.set(xlabel=TIME, ylim=(low - room, high + room))
         whole.set(ylabel=label(shown.title, shown.unit), xlim=(0, on.end))
         start.set_xlim(0, off.end * 1.1)
@@ -225,8 +259,8 @@ def _literal(study: Study) -> Figure:
     figure, panes = _parts((1, 1), 2.4)
     for axes, joint in zip(panes, JOINTS, strict=True):
         for name, (run, _), line in (
-            ("δ = 0, $a_{max}$ = 200", study.literal["limited"], _solid(LINES[1], 0.6)),
-            ("δ = 0.05, $a_{max}$ = 200", study.layers["0.05"], _solid(LINES[0])),
+            (typeset("δ = 0"), study.literal["limited"], _solid(LINES[1], 0.6)),
+            (typeset("δ = 0.05"), study.layers["0.05"], _solid(LINES[0])),
         ):
             draw(axes, run["t"], run[f"{E.name}_{joint.name}"], name, **line)
         axes.set(xlabel=TIME, ylabel=label(f"{joint.name} error", unit_of(E, joint)))
@@ -258,6 +292,8 @@ def _readings(study: Study) -> Figure:
 def _decisions(study: Study) -> Figure:
     """Steady-state error of the lift against the two numbers that are ours: delta and a_max."""
     figure, (left, right) = _parts((1, 1), 2.4)
+    first = next(iter(study.scenarios.values()))
+    bound = first.document["simulation"]["settling_band"] * abs(float(study.layers["0.05"][0]["e_lift"][0]))
     for axes, runs, table, key in (
         (left, study.layers, LAYERS, "control.delta"),
         (right, study.limits, LIMITS, "control.a_max"),
@@ -266,11 +302,11 @@ def _decisions(study: Study) -> Figure:
         errors = np.array([run.metric("steady_state_error", "lift") for run, _ in runs.values()])
         good = np.isfinite(values) & np.isfinite(errors)
         axes.plot(values[good], errors[good], marker="o", markersize=4, **_solid(LINES[0]))
-        axes.axhline(0.05 * 0.8, label="5 % of the initial error", **REFERENCE)
+        axes.axhline(bound, label=f"settling band, {1e3 * bound:.3g} mm", **REFERENCE)
         axes.set(xscale="log", yscale="log")
         axes.margins(x=0.05)
-    left.set(xlabel="δ [m or rad]", ylabel=label("steady-state error, lift", unit_of(E, LIFT)))
-    right.set(xlabel="$a_{max}$ [m/s² or rad/s²]")
+    left.set(xlabel=typeset("δ [m or rad]"), ylabel=label("steady-state error, lift", unit_of(E, LIFT)))
+    right.set(xlabel=typeset("a_max [m/s² or rad/s²]"))
     legend_above(figure)
     return figure
 
@@ -280,73 +316,59 @@ def _solid(line: Line, width: float = 1.1) -> Line:
     return {**line, "linestyle": "-", "linewidth": width}
 
 
-def _title(number: int) -> str:
-    return f"figure_{number:02d}"
-
-
 def _group_figures(
     first: int,
     group: int,
-    intro: str,
+    shows: str,
     shown_by_name: Mapping[str, Shown],
     how: Callable[[Shown], Callable[[Study], Figure]],
 ) -> tuple[PaperFigure, ...]:
     return tuple(
-        PaperFigure(_title(number), f"**Figure {number}.** {intro} {name}.", group, how(shown))
+        PaperFigure(f"figure_{number:02d}", str(number), f"{name}, {shows} (group {group})", group, how(shown))
         for number, (name, shown) in enumerate(shown_by_name.items(), first)
     )
 
 
-_FOUR = {"lift position": POSITION, "rotation angle": ANGLE, "lift velocity": VELOCITY, "angular velocity": SPIN}
-_SIX: dict[str, Any] = {**_FOUR, "lift velocity error": VELOCITY_ERROR, "angular velocity error": SPIN_ERROR}
+_FOUR = {"Lift position": POSITION, "Rotation angle": ANGLE, "Lift velocity": VELOCITY, "Angular velocity": SPIN}
+_SIX: dict[str, Any] = {**_FOUR, "Lift velocity error": VELOCITY_ERROR, "Angular velocity error": SPIN_ERROR}
 
 FIGURES: tuple[PaperFigure, ...] = (
-    PaperFigure(
-        "figure_04",
-        "**Figure 4.** The three reaching laws with Table 3's numbers, in the phase plane (σ, dσ/dt).",
-        None,
-        _reaching_laws,
-    ),
+    PaperFigure("figure_04", "4", "The three reaching laws (18) to (21) with Table 3's numbers", None, _reaching_laws),
     PaperFigure(
         "figure_05",
-        f"**Figure 5.** σ under the three laws with one linear surface σ = ė + c e, c = {LINEAR_GAIN:g} 1/s "
-        "(ours; the paper's coefficient is not published), base at rest.",
+        "5",
+        r"σ under the three laws with a linear surface $\sigma = \dot{e} + c\, e$, base at rest",
         None,
         _linear_surface,
+        f"$c$ = {LINEAR_GAIN:g} 1/s is ours; the paper's is not published.",
     ),
+    PaperFigure("figure_06", "6", "Block diagram of the composite control", None, lambda study: block_diagram()),
     PaperFigure(
-        "figure_06", "**Figure 6.** Block diagram of the composite control.", None, lambda study: block_diagram()
+        "figure_07", "7", "The three base oscillations (ours: the paper's are not published)", 1, _base_oscillations
     ),
-    PaperFigure(
-        "figure_07",
-        "**Figure 7.** The three base oscillations. They are ours: the paper's are not published.",
-        1,
-        _base_oscillations,
-    ),
-    *_group_figures(8, 1, "Group 1, variable power log law under each oscillation:", _FOUR, partial(_group, 1)),
-    *_group_figures(12, 2, "Group 2, the three laws under shake:", _FOUR, partial(_group, 2)),
-    *_group_figures(
-        16, 3, "Group 3, payload of the plant changed, controller unchanged, under shake:", _SIX, partial(_group, 3)
-    ),
-    *_group_figures(22, 4, "Group 4, fast control on and off, under shake:", _FOUR, _flutter),
+    *_group_figures(8, 1, "variable power log law under each oscillation", _FOUR, partial(_group, 1)),
+    *_group_figures(12, 2, "the three laws under shake", _FOUR, partial(_group, 2)),
+    *_group_figures(16, 3, "payload of the plant alone changed, under shake", _SIX, partial(_group, 3)),
+    *_group_figures(22, 4, "fast control on and off, under shake", _FOUR, _flutter),
 )
 
 OPEN_FIGURES: tuple[PaperFigure, ...] = (
     PaperFigure(
         "literal_law",
-        "The printed law (δ = 0) with its acceleration limited, beside the boundary layer of the packaged "
-        "scenarios. Base at rest.",
+        "A1",
+        "The printed law (δ = 0) and the boundary layer, both with a_max, base at rest",
         None,
         _literal,
     ),
     PaperFigure(
-        "log_readings", "The two readings of the logarithms in (18) under a shake of 0.07 sin 11t.", None, _readings
+        "log_readings",
+        "A2",
+        "The two readings of the logarithms in (18), under a shake of 0.07 sin 11$t$ m",
+        None,
+        _readings,
     ),
     PaperFigure(
-        "our_numbers",
-        "What the two numbers that are ours do: steady-state error of the lift, base at rest.",
-        None,
-        _decisions,
+        "our_numbers", "A3", "Steady-state error of the lift against δ and a_max, base at rest", None, _decisions
     ),
 )
 """Figures that the paper does not have."""

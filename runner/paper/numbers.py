@@ -15,7 +15,7 @@ def plain(value: float | None) -> float | str | None:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number for people; "–" where there is none."""
+    """A measured number for people, with all its digits, zeros at the end too; "–" where there is none."""
     if value is None or math.isnan(value):
         return "–"
     if math.isinf(value):
@@ -23,10 +23,22 @@ def number(value: float | None, digits: int = 3) -> str:
     if value == 0:
         return "0"
     if 1e-4 <= abs(value) < 1e5:
-        text = f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
+        text = f"{value:#.{digits}g}".rstrip(".") if abs(value) < 10**digits else f"{value:.0f}"
         return text.replace("-", "−")
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}".replace("-", "−")
+
+
+def exact(value: float) -> str:
+    """A number that is given and not measured, without zeros at its end."""
+    if math.isinf(value):
+        return number(value)
+    if value == 0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.4g}".replace("-", "−")
+    mantissa, exponent = f"{value:.3e}".split("e")
+    digits = mantissa.rstrip("0").rstrip(".")
+    power = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    return power if digits == "1" else f"{digits}·{power}".replace("-", "−")
 
 
 def change(difference: float | None, of: float) -> str:

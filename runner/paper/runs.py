@@ -22,6 +22,7 @@ from springline.runner.files import InputError, Problem
 from springline.runner.paper.cases import LAWS, cases
 from springline.runner.paper.evidence import Evidence, Inherent
 from springline.runner.paper.measured import Floats, Measured
+from springline.runner.paper.numbers import exact
 from springline.runner.run import Crew, Progress, Result, results, simulate, trajectory_table
 from springline.runner.scenario import Scenario, load_scenario
 
@@ -52,7 +53,7 @@ class Experiment:
 
 LITERAL: Mapping[str, Experiment] = {
     "unlimited": Experiment("δ = 0, no limits", "paper/as_printed", {}),
-    "limited": Experiment("δ = 0, a_max = 200", "paper/as_printed", {"control.a_max": 200.0}),
+    "limited": Experiment("δ = 0, a_max = 200 m/s², rad/s²", "paper/as_printed", {"control.a_max": 200.0}),
 }
 """The law as it is printed: no boundary layer."""
 
@@ -71,7 +72,7 @@ LAYERS: Mapping[str, Experiment] = {
 """Width of the boundary layer, base at rest."""
 
 LIMITS: Mapping[str, Experiment] = {
-    f"{a_max:g}": Experiment(f"a_max = {a_max:g}", "paper/nominal", {"control.a_max": a_max})
+    f"{a_max:g}": Experiment(f"a_max = {exact(a_max)}", "paper/nominal", {"control.a_max": a_max})
     for a_max in (50.0, 100.0, 200.0, 500.0, 1000.0, 1500.0, float("inf"))
 }
 """Limit on the reaching law, base at rest."""
@@ -88,9 +89,9 @@ SAMPLING: Mapping[str, Experiment] = {
 """The three laws under shake with sampled control (E11). Periods are multiples of the scenarios' step and its half."""
 
 SOLVER: Mapping[str, Experiment] = {
-    "fine": Experiment("a_max = 50, step 0.1 ms", "paper/group4_fast_off", {"control.a_max": 50.0}),
+    "fine": Experiment("a_max = 50 m/s², rad/s², step 0.1 ms", "paper/group4_fast_off", {"control.a_max": 50.0}),
     "coarse": Experiment(
-        "a_max = 50, step 1 ms", "paper/group4_fast_off", {"control.a_max": 50.0, "simulation.step": 1e-3}
+        "a_max = 50 m/s², rad/s², step 1 ms", "paper/group4_fast_off", {"control.a_max": 50.0, "simulation.step": 1e-3}
     ),
     "motors": Experiment(
         "motors limited to 2000 N and 5000 N m instead of the law, step 0.1 ms",

@@ -2,6 +2,7 @@ from .docs_tables import put as put
 from .document import Block as Block
 from .document import Bullets as Bullets
 from .document import Document as Document
+from .document import Equation as Equation
 from .document import Heading as Heading
 from .document import Picture as Picture
 from .document import Source as Source

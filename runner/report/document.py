@@ -1,6 +1,6 @@
 """A document written once, as Markdown beside its pictures and as one HTML file that holds everything.
 
-In text, `code`, **strong** and [[badge]] are marked up; everything else is printed as it stands.
+In text, `code`, **strong**, [[badge]] and $TeX$ (a formula) are marked up; everything else is printed as it stands.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from springline.codegen.files import render
+from springline.runner.report.mathematics import to_inline, to_mathml, to_text
 
 _SHORT = 24
 """Letters of a cell up to which its column's lines are not broken."""
@@ -19,7 +20,7 @@ _SHORT = 24
 _LARGE = 200_000
 """Bytes up to which an SVG is taken whatever its PNG is: it is sharp at any size."""
 
-_MARK = re.compile(r"(`[^`]+`|\*\*[^*]+\*\*|\[\[[^\]]+\]\])")
+_MARK = re.compile(r"(`[^`]+`|\*\*[^*]+\*\*|\[\[[^\]]+\]\]|\$[^$]+\$)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +50,21 @@ class Bullets:
 
 
 @dataclass(frozen=True, slots=True)
+class Equation:
+    """A formula on a line of its own, in TeX, with its number or what else stands beside it."""
+
+    kind: ClassVar[str] = "equation"
+    tex: str
+    label: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Table:
     """Cells as text, row by row, as long as `columns`; the first `labels` columns are words, the others numbers.
 
     words   places of further columns of words
     shades  (row, column) -> class of the page's style by which a cell is shaded
+    over    headings above those of the columns, each with the number of columns that it spans; together they span all
     """
 
     kind: ClassVar[str] = "table"
@@ -63,6 +74,13 @@ class Table:
     labels: int = 1
     words: Sequence[int] = ()
     shades: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    over: Sequence[tuple[str, int]] = ()
+
+    @property
+    def full_columns(self) -> Sequence[str]:
+        """Headings for a table that has one row of them: "over: column"."""
+        above = [title for title, span in self.over for _ in range(span)] or [""] * len(self.columns)
+        return [f"{a}: {b}" if a and b else a or b for a, b in zip(above, self.columns, strict=True)]
 
     def is_number(self, column: int) -> bool:
         """Whether a column is set as numbers are."""
@@ -70,7 +88,7 @@ class Table:
 
     def classes(self, row: int, column: int) -> str:
         """The classes of a cell in the page's style: number, short (where no cell of its column is long), its shade."""
-        short = all(len(cells[column]) <= _SHORT for cells in self.rows)
+        short = all(len(_plain(cells[column])) <= _SHORT for cells in self.rows)
         found = (
             "number" if self.is_number(column) else "",
             "short" if short else "",
@@ -109,7 +127,7 @@ class Source:
     text: str
 
 
-Block = Heading | Text | Bullets | Table | Picture | Source
+Block = Heading | Text | Bullets | Equation | Table | Picture | Source
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +141,9 @@ class Document:
 
 def to_markdown(document: Document) -> str:
     """The document as Markdown (CommonMark with tables); pictures are links to PNG files, with the SVG beside."""
-    return render("springline.runner.report", "report.md.j2", document=document, pieces=_pieces, plain=_plain)
+    return render(
+        "springline.runner.report", "report.md.j2", document=document, pieces=_pieces, plain=_plain, formula=_tagged
+    )
 
 
 def to_html(document: Document) -> str:
@@ -135,11 +155,13 @@ def to_html(document: Document) -> str:
         pieces=_pieces,
         plain=_plain,
         anchor=_anchor,
+        formula=to_inline,
+        mathml=to_mathml,
     )
 
 
 def _pieces(text: str) -> Iterator[tuple[str, str]]:
-    """What a text consists of: "code", "strong", "badge" or "text", and what is marked so."""
+    """What a text consists of: "code", "strong", "badge", "formula" or "text", and what is marked so."""
     for piece in _MARK.split(text):
         if piece.startswith("`"):
             yield "code", piece[1:-1]
@@ -147,13 +169,19 @@ def _pieces(text: str) -> Iterator[tuple[str, str]]:
             yield "strong", piece[2:-2]
         elif piece.startswith("[["):
             yield "badge", piece[2:-2]
+        elif piece.startswith("$"):
+            yield "formula", piece[1:-1]
         elif piece:
             yield "text", piece
 
 
 def _plain(text: str) -> str:
-    return "".join(piece for _, piece in _pieces(text))
+    return "".join(to_text(piece) if kind == "formula" else piece for kind, piece in _pieces(text))
+
+
+def _tagged(tex: str) -> str:
+    return to_text(tex, tags=True)
 
 
 def _anchor(text: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+    return re.sub(r"[^a-z0-9]+", "-", _plain(text).lower()).strip("-")
