@@ -131,10 +131,10 @@ def commands() -> str:
     """Every command with its arguments and options."""
     parts = [f"# {TITLES['commands']}\n\nWhat `springline COMMAND --help` says.\n"]
     for name, command, context in walk(typer.main.get_command(app), None, "springline"):
-        usage = " ".join([name, *command.collect_usage_pieces(context)])
+        usage = re.sub(r"[{}]", "", " ".join([name, *command.collect_usage_pieces(context)]))
         parts.append(f"\n## {name}\n\n{paragraphs(command.help or '')}\n\n```text\n{usage}\n```\n\n")
         records = [parameter.get_help_record(context) for parameter in command.get_params(context)]
-        rows = [(f"`{cell(names)}`", cell(text)) for names, text in filter(None, records)]
+        rows = [(code(names), cell(text)) for names, text in filter(None, records)]
         parts.append(table(("argument or option", "what"), rows))
         if epilog := getattr(command, "epilog", None):
             parts.append(f"\n{paragraphs(epilog)}\n")
@@ -155,8 +155,13 @@ def paragraphs(text: str) -> str:
 
 
 def cell(text: str) -> str:
-    """Plain text as it stands in a table in Markdown."""
-    return " ".join(text.split()).replace("|", r"\|").replace("<", r"\<")
+    """Plain text as it stands in a cell of a table in Markdown."""
+    return plain(" ".join(text.split()))
+
+
+def code(text: str) -> str:
+    """Code in such a cell."""
+    return f"`{' '.join(text.split())}`".replace("|", r"\|")
 
 
 # --- keys of a scenario -----------------------------------------------------------------------------------
@@ -235,7 +240,7 @@ def default_text(default: Any) -> str:
     """A default as in TOML; what has none is left empty."""
     if default is None or default is PydanticUndefined:
         return ""
-    return f"`{given_text(default)}`"
+    return code(given_text(default))
 
 
 def meaning(key: str, known: Mapping[str, str]) -> str:
@@ -284,7 +289,7 @@ def declarations(text: str) -> Iterator[tuple[str, str]]:
     for piece in re.split(r"\n{2,}", text.strip()):
         comment = re.match(r"/\*(.*?)\*/\n", piece, re.DOTALL)
         said = re.sub(r"\n \* ?", "\n", comment[1]).strip() if comment else ""
-        yield cell(said).replace("*", r"\*").replace("_", r"\_"), piece[comment.end() :] if comment else piece
+        yield cell(said), piece[comment.end() :] if comment else piece
 
 
 def c_name(code: str) -> str:
@@ -368,7 +373,7 @@ def signature(item: Any) -> str:
         for each in found.parameters.values()
     ]
     text = str(found.replace(parameters=shown, return_annotation=text_of(found.return_annotation)))
-    return " ".join(text.replace("'", "").split())
+    return " ".join(text.replace("'", "").removesuffix(" -> None").split()) if inspect.isclass(item) else " ".join(text.replace("'", "").split())
 
 
 class Shown:
@@ -379,7 +384,7 @@ class Shown:
 
     def __repr__(self) -> str:
         text = repr(self.value)
-        return "…" if len(text) > 30 or " at 0x" in text else text.replace("'", '"')
+        return "…" if len(text) > 30 or text.startswith("<") else text.replace("'", '"')
 
 
 def text_of(annotation: Any) -> Any:
