@@ -31,6 +31,7 @@ from springline.runner.sweep import load_sweep
 ROOT = Path(__file__).parent.parent
 OTHERS = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "examples/README.md")]
 PAGES = [*OTHERS, *sorted((ROOT / "docs").glob("*.md"))]
+TUTORIAL = ROOT / "docs/tutorial.md"  # shows what is printed, and so has a test of its own
 HOUSE = ROOT / "docs/architecture.md"  # changes springline itself, and so has a test of its own
 PROGRAMS = ("springline", "make", "pip", "python", "fmpy")
 STEPS = 100  # of every documented run
@@ -206,7 +207,7 @@ RUNNERS: dict[str, Callable[[Block], None]] = {"sh": run_shell, "python": run_py
 
 
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if page != HOUSE and any(blocks(page))], ids=lambda page: page.name
+    "page", [page for page in PAGES if page not in {HOUSE, TUTORIAL} and any(blocks(page))], ids=lambda page: page.name
 )
 @pytest.mark.usefixtures("place")
 def test_every_block_of_a_page_works(page: Path) -> None:
@@ -220,6 +221,55 @@ def test_what_is_run_elsewhere_is_documented() -> None:
         line for page in PAGES for block in blocks(page) if block.language == "sh" for line in commands(block.text)
     }
     assert set(ELSEWHERE) <= shown
+
+
+# --- the tutorial ----------------------------------------------------------------------------------------
+
+
+def output_of(block: Block) -> str:
+    """Run a shell block, in the working directory; what its commands print."""
+    printed = ""
+    for line in commands(block.text):
+        program, *arguments = shlex.split(line)
+        if program == "springline":
+            result = CliRunner().invoke(app, arguments, prog_name="springline")
+            code, output = result.exit_code, result.output
+        else:
+            done = subprocess.run(["sh", "-c", line], check=False, capture_output=True, text=True)
+            code, output = done.returncode, done.stdout + done.stderr
+        assert code == 0, f"{block}: {line}\n{output}"
+        printed += output
+    return printed
+
+
+def expect_shown(block: Block, printed: str) -> None:
+    """Each line of the block must have been printed, in this order; … stands for anything, blanks do not count."""
+    rest = " ".join(printed.split())
+    for line in block.text.splitlines():
+        parts = [r"\s*".join(map(re.escape, part.split())) for part in line.split("…")]
+        found = re.search(".*?".join(parts), rest)
+        assert found, f"{block}: not printed: {line}\n{printed}"
+        rest = rest[found.end() :]
+
+
+def test_the_tutorial_prints_what_it_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, require_tool: Callable[..., str]
+) -> None:
+    """With its runs in full length; the figures alone are not drawn."""
+    require_tool("cc")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("springline.runner.report.figure_files", lambda name, _: {f"{name}.png": b""})
+    printed = ""
+    for block in blocks(TUTORIAL):
+        match block.language:
+            case "sh":
+                printed = output_of(block)
+            case "text":
+                expect_shown(block, printed)
+            case _:
+                name = re.match(r"(?:#|/\*) ([\w-]+\.\w+)", block.text)
+                assert name, f"{block}: whose content is this?"
+                Path(name[1]).write_text(block.text + "\n", encoding="utf-8")
 
 
 # --- how-tos that change springline itself ---------------------------------------------------------------

@@ -19,8 +19,9 @@ TAG = re.compile(r"\\tag\{([^}]*)\}")
 
 def mathml(latex: str, display: str) -> str:
     """A formula as MathML. Raises ExtensionError for a command that is not known: it would be shown as it stands."""
-    text = convert(latex, display=display)
-    unknown = re.findall(r"\\[a-zA-Z]*", text)
+    latex = re.sub(r"\\(cos|sin|ln)(?=\\)", r"\\\1\\,", latex)  # TeX's space between a function and its argument
+    text = convert(latex.replace("{aligned}", "{split}"), display=display)  # latex2mathml has no other name for it
+    unknown = re.findall(r"\\[a-zA-Z]*|>&<", text)
     if unknown:
         raise ExtensionError(f"no MathML for {unknown} in {latex}")
     return text

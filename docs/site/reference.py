@@ -110,7 +110,7 @@ def contents() -> Iterator[str]:
     """Hidden tables of contents of these pages."""
     listed = {
         "Reference": {name: title for name, title in TITLES.items()},
-        "Python": {f"python-{name}": name for name in doors()},
+        "Python": {f"python-{name}": name.removeprefix("springline.") for name in doors()},
     }
     for caption, entries in listed.items():
         lines = "\n".join(f"{title} <reference/{name}>" for name, title in entries.items())
