@@ -252,13 +252,16 @@ def expect_shown(block: Block, printed: str) -> None:
         rest = rest[found.end() :]
 
 
+@pytest.mark.full
 def test_the_tutorial_prints_what_it_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, require_tool: Callable[..., str]
 ) -> None:
     """With its runs in full length; the figures alone are not drawn."""
     require_tool("cc")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("springline.runner.report.figure_files", lambda name, _: {f"{name}.png": b""})
+    monkeypatch.setattr(
+        "springline.runner.report.figure_files", lambda name, _: {f"{name}.png": b"", f"{name}.svg": b""}
+    )
     printed = ""
     for block in blocks(TUTORIAL):
         match block.language:

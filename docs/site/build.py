@@ -4,8 +4,8 @@
 
 docs/*.md are the pages, as they are read on the code host; docs/index.md lists them, and that list is the navigation.
 What they link to outside docs/ becomes a page, too, and the reference is printed from the code. Everything is laid out
-in OUT/../docs-pages (build/docs-pages) and set by Sphinx, for which a warning is an error: a link or an anchor that leads
-nowhere among them. The same checkout gives the same bytes.
+in OUT-pages and set by Sphinx, for which a warning is an error: a link or an anchor that leads nowhere among them. The
+same checkout gives the same bytes.
 """
 
 from __future__ import annotations

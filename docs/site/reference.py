@@ -25,10 +25,10 @@ from springline.model.drive import DRIVES, EPSILON, friction_parameters
 from springline.model.hardware import ACTUATORS, SENSORS
 from springline.model.mechanisms import MECHANISMS
 from springline.model.parameters import Parameter
+from springline.model.system import control_parameters
 from springline.runner.cli import app
 from springline.runner.report import docs_tables
 from springline.runner.scenario.schema import Leaf, Section, given_text, schema
-from springline.model.system import control_parameters
 
 ROOT = Path(__file__).parents[2]
 HEADER = ROOT / "generated" / "include" / "springline.h"
@@ -109,7 +109,7 @@ def pages() -> dict[str, str]:
 def contents() -> Iterator[str]:
     """Hidden tables of contents of these pages."""
     listed = {
-        "Reference": {name: title for name, title in TITLES.items()},
+        "Reference": TITLES,
         "Python": {f"python-{name}": name.removeprefix("springline.") for name in doors()},
     }
     for caption, entries in listed.items():
@@ -186,8 +186,9 @@ def scenario_keys() -> str:
         ]
     )
     parts = [
-        f"# {TITLES['scenario-keys']}\n\nFor the packaged two-joint arm; `<joint>` is `lift` or `rotation`. Another arm "
-        "has keys of its own: `springline list parameters SCENARIO`. What the tables are for: [scenarios](../scenarios.md).\n"
+        f"# {TITLES['scenario-keys']}\n\nFor the packaged two-joint arm; `<joint>` is `lift` or `rotation`. "
+        "Another arm has keys of its own: `springline list parameters SCENARIO`. What the tables are for: "
+        "[scenarios](../scenarios.md).\n"
     ]
     for name, section in whole.sections.items():
         parts.append(section_part(name, section, f"[{name}]", known))
@@ -275,8 +276,8 @@ def c_api() -> str:
     """The header of the default scenario: each declaration under its name, with its comment."""
     text = HEADER.read_text(encoding="utf-8").partition('extern "C" {\n#endif\n')[2].partition("#ifdef __cplusplus")[0]
     parts = [
-        f"# {TITLES['c-api']}\n\n`springline.h` of the default scenario: `springline export c` gives the same with the joints, "
-        "gains and prefix of yours. How it is used: [embedding](../embedding.md).\n"
+        f"# {TITLES['c-api']}\n\n`springline.h` of the default scenario: `springline export c` gives the same "
+        "with the joints, gains and prefix of yours. How it is used: [embedding](../embedding.md).\n"
     ]
     for comment, code in declarations(text):
         name = c_name(code)
@@ -316,7 +317,9 @@ def doors() -> dict[str, dict[str, Any]]:
         room = importlib.import_module(module)
         found[module] = {name: getattr(room, name) for name in sorted(set(names), key=str.lower)}
     order = ("springline", "springline.runner", "springline.model", "springline.codegen")
-    return dict(sorted(found.items(), key=lambda item: (item[0] != order[0], *(not item[0].startswith(o) for o in order[1:]))))
+    return dict(
+        sorted(found.items(), key=lambda item: (item[0] != order[0], *(not item[0].startswith(o) for o in order[1:])))
+    )
 
 
 def python_page(module: str) -> str:
@@ -373,7 +376,11 @@ def signature(item: Any) -> str:
         for each in found.parameters.values()
     ]
     text = str(found.replace(parameters=shown, return_annotation=text_of(found.return_annotation)))
-    return " ".join(text.replace("'", "").removesuffix(" -> None").split()) if inspect.isclass(item) else " ".join(text.replace("'", "").split())
+    return (
+        " ".join(text.replace("'", "").removesuffix(" -> None").split())
+        if inspect.isclass(item)
+        else " ".join(text.replace("'", "").split())
+    )
 
 
 class Shown:
@@ -427,7 +434,9 @@ def escaped(text: str) -> str:
         if in_list and not (line.startswith(" ") and line.strip()):
             lines += [""]
             in_list = False
-        lines.append(line if code and not in_list else f"{'  ' if in_list else ''}{plain(line.strip() if in_list else line)}")
+        lines.append(
+            line if code and not in_list else f"{'  ' if in_list else ''}{plain(line.strip() if in_list else line)}"
+        )
     return "\n".join(lines)
 
 
