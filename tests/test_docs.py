@@ -80,7 +80,7 @@ def blocks(page: Path) -> Iterator[Block]:
 
 def commands(text: str) -> list[str]:
     """The commands of a shell block, without comments and without the words that explain them in a second column."""
-    lines = text.replace("\\\n", " ").splitlines()
+    lines = re.sub(r"\s*\\\n\s*", " ", text).splitlines()
     plain = (re.split(r"\s{2,}|\s#", line)[0].strip() for line in lines if not line.startswith("#"))
     return [line for line in plain if line]
 

@@ -315,7 +315,9 @@ def doors() -> dict[str, dict[str, Any]]:
         module = module if module == "springline" else f"springline.{module}"
         names = re.findall(r" import \w+ as (\w+)$", stub.read_text(encoding="utf-8"), re.MULTILINE)
         room = importlib.import_module(module)
-        found[module] = {name: getattr(room, name) for name in sorted(set(names), key=str.lower)}
+        found[module] = {
+            name: getattr(room, name) for name in sorted(set(names), key=lambda name: (name.lower(), name))
+        }
     order = ("springline", "springline.runner", "springline.model", "springline.codegen")
     return dict(
         sorted(found.items(), key=lambda item: (item[0] != order[0], *(not item[0].startswith(o) for o in order[1:])))
