@@ -24,7 +24,8 @@ def mathml(latex: str, display: str) -> str:
     unknown = re.findall(r"\\[a-zA-Z]*|>&<", text)
     if unknown:
         raise ExtensionError(f"no MathML for {unknown} in {latex}")
-    return text
+    # A bar is an operator to MathML, with space on one side.
+    return re.sub(r"<mo[^>]*>(&#x0007C;|\|)</mo>", '<mo lspace="0" rspace="0" stretchy="false">|</mo>', text)
 
 
 def inline(writer: HTML5Translator, node: nodes.math) -> None:

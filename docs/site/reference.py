@@ -295,7 +295,7 @@ def declarations(text: str) -> Iterator[tuple[str, str]]:
 
 def c_name(code: str) -> str:
     """What a piece of a header declares."""
-    for pattern in (r"struct (\w+)", r"(\w+)\(", r"#define (\w+)", r"(\w+)(?:\[\d*\])?;$", r"^\s+(\w+?)_[A-Z]+ ="):
+    for pattern in (r"struct (\w+)", r"(\w+)\(", r"#define (\w+)", r"(\w+)(?:\[\d*\])?;$"):
         found = re.search(pattern, code, re.MULTILINE)
         if found:
             return found[1]
