@@ -13,7 +13,7 @@ PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-bui
 SHIPPED = $(shell find springline model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format docs-tables docs-controllers docs-hardware docs-sweeps docs-pictures math-accuracy prove firmware bench docs-bench clean FORCE
+.PHONY: help install reproduce test test-full lint format docs docs-tables docs-controllers docs-hardware docs-sweeps docs-pictures math-accuracy prove firmware bench docs-bench clean FORCE
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -38,6 +38,10 @@ lint: .venv/installed ## ruff and mypy
 format: .venv/installed ## let ruff put the code in order
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
+
+docs: .venv/installed ## docs/ as a site with search and the reference of everything: build/docs/index.html
+	$(PIP) --editable '.[docs]'
+	$(BIN)/python docs/site/build.py
 
 docs-tables: .venv/installed ## print the tables of columns, metrics and sensors in docs/scenarios.md anew
 	$(BIN)/python -m runner.report.docs_tables --write
