@@ -66,6 +66,14 @@ def _aims() -> Iterable[Aim]:
         yield Aim(f"{free}, over baked", (ours.NAME, free), default(mode), (1.25, 1.2), most=True)
     for mode in ("continuous", "sampled"):
         yield Aim(f"{mode}: one thread over two", default(mode), (ours.NAME, f"{mode}, 2 threads"), 1.9, cores=2)
+    for effects in ours.REAL:
+        yield Aim(
+            f"{ours.HELD}: {effects}, over ideal",
+            (ours.NAME, f"{ours.HELD}, {effects}"),
+            (ours.NAME, ours.HELD),
+            1.25,
+            most=True,
+        )
     yield Aim(
         "plant of seven links over that of the paper's arm",
         (ours.NAME, ours.SEVEN),
@@ -76,7 +84,8 @@ def _aims() -> Iterable[Aim]:
 
 
 AIMS = tuple(_aims())
-"""All of them. How much longer others take, then what may be lost by tuning, won by threads, and taken by long arms."""
+"""All of them. How much longer others take, then what may be lost by tuning and real hardware, won by threads, taken by
+long arms."""
 
 _FREE = 0.95  # of the cores that an aim needs: threads that only calculate get no less where nothing else runs
 

@@ -1,4 +1,4 @@
-"""Springline itself: vector widths, everything tunable, threads, a single run, the casadi engine, plants alone."""
+"""Springline itself: vector widths, all tunable, threads, one run, the casadi engine, real hardware, plants alone."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from springline.codegen.kernel import (
     kernel,
     toolchain,
 )
+from springline.model.hardware import ACTUATORS, SENSORS
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 
@@ -39,6 +40,18 @@ PLANTS = {
 }
 """Arms of which the plant is timed alone, on the same base, by variant."""
 
+HELD = "sampled every 10 steps"
+EFFECTS, DIFFERENCED = "hardware effects", "hardware effects, rates differenced"
+_HOLD = 10
+_ALL = tuple(effect.name for effect in (*SENSORS, *ACTUATORS))
+REAL = {
+    EFFECTS: replace(STRUCTURE, effects=_ALL, delay=3),
+    DIFFERENCED: replace(
+        STRUCTURE, effects=tuple(name for name in _ALL if name != "velocity_noise"), delay=3, differenced=True
+    ),
+}
+"""The arm with everything of [sensor] and [actuator]; rates are measured, with noise, or made of differences."""
+
 _VALUES = {
     "reference.lift.terms.0.amplitude": 1.0,
     "reference.lift.terms.0.omega": problem.REFERENCE_OMEGA[0],
@@ -50,11 +63,20 @@ _VALUES = {
     "initial.q.0": problem.INITIAL_STATE[0],
     "initial.q.1": problem.INITIAL_STATE[1],
 }
+_HARDWARE = {
+    "sensor.position_noise": 1e-5,
+    "sensor.velocity_noise": 1e-3,
+    "sensor.position_resolution": 1e-5,
+    "sensor.velocity_cutoff": 2e3,
+    "actuator.rate_limit": 1e7,
+    "actuator.lag": 1e-4,
+}
 
 
 def values(structure: Structure) -> dict[str, float]:
     """Every number of a system by its slot key: springline's defaults are the paper's."""
-    return {slot.key: _VALUES.get(slot.key, slot.default) for slot in System(structure).slots}
+    told = {slot.key: _HARDWARE.get(slot.key.rpartition(".")[0], slot.default) for slot in System(structure).slots}
+    return told | {key: value for key, value in _VALUES.items() if key in told}
 
 
 VALUES = values(STRUCTURE)
@@ -75,7 +97,7 @@ def build(spec: KernelSpec, threads: int = 1, hold: int = 1) -> problem.Runner:
     def run_part(delta: problem.Floats, steps: int) -> problem.Floats:
         parameters = np.tile([known[key] for key in loop.parameters], (delta.size, 1))
         parameters[:, column] = delta
-        runs = loop.run(parameters, LoopSettings(steps, problem.STEP, hold=hold))
+        runs = loop.run(parameters, LoopSettings(steps, problem.STEP, hold=hold), numbers=range(delta.size))
         if np.any(runs.status):
             raise RuntimeError(f"a run ended early, {STATUS[runs.status.max()]}: its time says nothing")
         return runs.final_state
@@ -93,6 +115,12 @@ def build_plant(structure: Structure) -> problem.Runner:
     """An arm under the command of its first sample: the law is evaluated once a run, the plant in every stage."""
     spec = KernelSpec(structure, True, ("control.delta",), tuple(values(structure).values()))
     return build(spec, hold=problem.STEPS)
+
+
+def build_sampled(structure: Structure, hold: int) -> problem.Runner:
+    """Control sampled once in so many steps, through what sensors and motors of a structure make of it."""
+    known = values(structure)
+    return build(KernelSpec(structure, True, ("control.delta",), tuple(known.values())), hold=hold)
 
 
 def build_fused(mode: problem.Control) -> problem.Runner:
@@ -129,7 +157,7 @@ def _contender(variant: str, spec: KernelSpec, *, batch: int = BATCH, threads: i
 
 
 def contenders() -> tuple[problem.Contender, ...]:
-    """Both control modes, each with the default first, and plants without their control."""
+    """Both control modes, each with the default first; sensors and motors that are not ideal; plants alone."""
     cores = os.cpu_count() or 1
     result = []
     for mode, default in DEFAULT.items():
@@ -142,6 +170,12 @@ def contenders() -> tuple[problem.Contender, ...]:
             result.append(_contender(f"{mode}, {threads} threads", default, threads=threads))
         result.append(_contender(f"{mode}, one run", replace(default, options=ONE_RUN), batch=1))
         result.append(_contender(f"{mode}, casadi engine", _printed(free, engine="casadi"), batch=1))
+    for variant, hold in (("sampled", 1), (HELD, _HOLD)):
+        arms = ({variant: STRUCTURE} if hold > 1 else {}) | {f"{variant}, {name}": arm for name, arm in REAL.items()}
+        result += [
+            problem.Contender(NAME, title, "sampled", partial(build_sampled, arm, hold), batch=BATCH, comparable=False)
+            for title, arm in arms.items()
+        ]
     result += [
         problem.Contender(NAME, variant, "sampled", partial(build_plant, arm), batch=BATCH, comparable=False)
         for variant, arm in PLANTS.items()

@@ -218,7 +218,7 @@ class _Emitter:
         return text.replace("static inline", "SL_RARE")
 
     def _actuate(self) -> str:
-        """What motors are driven by in a step."""
+        """What motors are driven by in a step, and what they remember then, for which m may be the place."""
         results = {"acting": len(self.graph.outputs["actuate"][0]), "ahead": self.program.size("m")}
         signature = "double step, const sl_group *arrived, const sl_group *m"
         return self._complete("actuate", signature, results).replace("SL_RARE", "static inline")

@@ -62,7 +62,9 @@ def preamble(
     assert program.size("d") == len(program.system.tables) + 4 * channels
     sensors = ""
     if measured := program.size("measured"):
+        pairs = ", ".join(map(str, program.system.noise_pairs))
         sensors = f"#define SL_NMEASURED {measured}\n#define SL_NNOISE {program.size('noise')}\n"
+        sensors += f"#define SL_NOISE_PAIRS {{{pairs}}}\n" if pairs else ""
     if program.size("commanded"):
         delay = program.system.structure.delay
         sensors += f"#define SL_ACTUATED 1\n#define SL_DELAY {delay}\n#define SL_NM {program.size('m')}\n"

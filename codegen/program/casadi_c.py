@@ -85,8 +85,9 @@ def kernel_header(program: Program, preamble: str) -> dict[str, str]:
     told = "double step, " * actuated + "double period, " * differenced
     if actuated:
         given = "double step, const sl_group *arrived, const sl_group *m, const sl_group *p, const sl_group *r"
-        results = ["(double *)acting", "(double *)ahead"]
-        body = call("actuate", f"{flat}arrived", f"{flat}m", "&step", p, results=results)
+        called = call("actuate", f"{flat}arrived", f"{flat}m", "&step", p, results=["(double *)acting", "after"])
+        copied = "memcpy(ahead, after, SL_NM * sizeof(double)); /* which may be m */"
+        body = f"  double after[SL_NM + 1];\n{called}\n  {copied}"
         actuate = f"static inline void kernel_actuate({given}, sl_group *acting, sl_group *ahead) {{\n{body}\n}}\n\n"
     if not (measured or actuated or differenced):  # continuous control has no samples, and so none of these
         closed = f"""static inline void kernel_closed({state}, sl_group *dx, {computed}) {{

@@ -328,6 +328,8 @@ static void observe(sl_pack *pack, int64_t k, sl_time now) {
 
 #if SL_SAMPLED
 #if SL_NNOISE > 0
+static const unsigned sl_noise_pairs[] = SL_NOISE_PAIRS; /* of each block of four, those that a sensor shows */
+
 /* Random numbers of step k, where that is a sample. */
 static void draw_noise(sl_pack *pack, int64_t k) {
   const sl_b none = {0};
@@ -337,8 +339,10 @@ static void draw_noise(sl_pack *pack, int64_t k) {
     for (block = 0; 4 * block < SL_NNOISE; block++) {
       sl_v z[4];
       slv_noise(none + (uint64_t)pack->job->seed, pack->number[g], none + (uint64_t)(k / pack->job->hold),
-                none + (uint64_t)block, z);
-      for (i = 0; i < 4 && 4 * block + i < SL_NNOISE; i++) pack->noise[4 * block + i][g] = z[i];
+                none + (uint64_t)block, sl_noise_pairs[block], z);
+      for (i = 0; i < 4 && 4 * block + i < SL_NNOISE; i++) {
+        if (sl_noise_pairs[block] >> (i / 2) & 1) pack->noise[4 * block + i][g] = z[i];
+      }
     }
   }
 }
@@ -369,8 +373,8 @@ static void sample_control(sl_pack *pack, int64_t k, sl_time now) {
 /* Of step k: its sample, if it has one, and what the motors are driven by at its nodes. */
 static void drive_motors(sl_pack *pack, int64_t k, sl_time now) {
   const sl_group *arrived = (const sl_group *)pack->command;
-  sl_group ahead[SL_NM + 1], late[SL_NJ];
 #if SL_DELAY > 0
+  sl_group late[SL_NJ];
   int64_t place;
 #endif
   if (k % pack->job->hold == 0) {
@@ -390,12 +394,10 @@ static void drive_motors(sl_pack *pack, int64_t k, sl_time now) {
   memcpy(late, pack->line[place], sizeof late);
   memcpy(pack->line[place], pack->command, sizeof late);
   arrived = (const sl_group *)late;
-#else
-  (void)late;
 #endif
+  /* m is read before it is written */
   kernel_actuate(pack->job->step, arrived, (const sl_group *)pack->m, (const sl_group *)pack->p,
-                 (const sl_group *)pack->r, pack->acting[0], ahead);
-  memcpy(pack->m, ahead, SL_NM * sizeof(sl_group));
+                 (const sl_group *)pack->r, pack->acting[0], pack->m);
   memcpy(pack->u, pack->acting[0], sizeof pack->u);
 }
 #endif

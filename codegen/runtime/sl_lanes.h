@@ -232,6 +232,31 @@ static inline sl_v slv_sqrt(sl_v x) {
 #error "SL_W must be 1, 2, 4, 8 or 16"
 #endif /* SL_W */
 
+/* A product of words of 32 bits in lanes of 64. GCC multiplies all 64 bits, in three products and their
+ * sums; Clang sees that there are no more than 32. */
+#if defined(__has_builtin) && !defined(__clang__)
+#if SL_W == 8 && defined(__AVX512F__)
+#if __has_builtin(__builtin_ia32_pmuludq512_mask)
+#define SL_HALVES(x) ((int __attribute__((vector_size(64))))(x))
+#define slv_word_product(a, b) \
+  ((sl_b)__builtin_ia32_pmuludq512_mask(SL_HALVES(a), SL_HALVES(b), (long long __attribute__((vector_size(64))))(a), 255))
+#endif
+#elif SL_W == 4 && defined(__AVX2__)
+#if __has_builtin(__builtin_ia32_pmuludq256)
+#define SL_HALVES(x) ((int __attribute__((vector_size(32))))(x))
+#define slv_word_product(a, b) ((sl_b)__builtin_ia32_pmuludq256(SL_HALVES(a), SL_HALVES(b)))
+#endif
+#elif SL_W == 2 && defined(__SSE2__)
+#if __has_builtin(__builtin_ia32_pmuludq128)
+#define SL_HALVES(x) ((int __attribute__((vector_size(16))))(x))
+#define slv_word_product(a, b) ((sl_b)__builtin_ia32_pmuludq128(SL_HALVES(a), SL_HALVES(b)))
+#endif
+#endif
+#endif
+#ifndef slv_word_product
+#define slv_word_product(a, b) ((a) * (b))
+#endif
+
 /* Of two lanes each: lane i of a, and lane j of b. */
 #ifdef __clang__
 #define SL_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)

@@ -15,16 +15,19 @@
 #define SL_NOISE_REAL sl_v
 #define SL_NOISE_WORD sl_b /* 32 bits in 64, for products */
 #define SL_NOISE_NUMBER(x) slv_set(x)
+#define SL_NOISE_PRODUCT(a, b) slv_word_product(a, (SL_NOISE_WORD){0} + (b))
 #elif defined(SL_NOISE_SINGLE)
 #define SL_NOISE(name) slf_##name
 #define SL_NOISE_REAL float
 #define SL_NOISE_WORD uint64_t
 #define SL_NOISE_NUMBER(x) x##f
+#define SL_NOISE_PRODUCT(a, b) ((a) * (b))
 #else
 #define SL_NOISE(name) sl_##name
 #define SL_NOISE_REAL double
 #define SL_NOISE_WORD uint64_t
 #define SL_NOISE_NUMBER(x) x
+#define SL_NOISE_PRODUCT(a, b) ((a) * (b))
 #endif
 
 #ifndef SL_PHILOX_H
@@ -36,8 +39,8 @@
 static inline void sl_philox(SL_NOISE_WORD counter[4], SL_NOISE_WORD key_0, SL_NOISE_WORD key_1) {
   int round;
   for (round = 0; round < 10; round++) {
-    const SL_NOISE_WORD a = counter[0] * UINT64_C(0xd2511f53);
-    const SL_NOISE_WORD b = counter[2] * UINT64_C(0xcd9e8d57);
+    const SL_NOISE_WORD a = SL_NOISE_PRODUCT(counter[0], UINT64_C(0xd2511f53));
+    const SL_NOISE_WORD b = SL_NOISE_PRODUCT(counter[2], UINT64_C(0xcd9e8d57));
     counter[0] = (b >> 32) ^ counter[1] ^ key_0;
     counter[1] = b & SL_NOISE_LOW;
     counter[2] = (a >> 32) ^ counter[3] ^ key_1;
@@ -66,21 +69,25 @@ static inline SL_NOISE_REAL SL_NOISE(noise_number)(SL_NOISE_WORD word) {
 #endif
 }
 
-/* Standard normal numbers z[0] ... z[3] of channels 4 block ... 4 block + 3. */
+/* Standard normal numbers z[0] ... z[3] of channels 4 block ... 4 block + 3; of pairs, 1 asks for the
+ * first two, 2 for the last two, 3 for both, and z is left as it is where none are asked for. */
 static inline void SL_NOISE(noise)(
     SL_NOISE_WORD seed,
     SL_NOISE_WORD run,
     SL_NOISE_WORD sample,
     SL_NOISE_WORD block,
+    unsigned pairs,
     SL_NOISE_REAL z[4]) {
   SL_NOISE_WORD words[4];
-  int i;
+  unsigned i;
   words[0] = sample & SL_NOISE_LOW;
   words[1] = sample >> 32;
   words[2] = block;
   words[3] = run >> 32;
   sl_philox(words, seed, run & SL_NOISE_LOW);
-  for (i = 0; i < 4; i += 2) { /* 2^-32 and 2 pi 2^-32: never the logarithm of 0 */
+  for (i = 0; i < 4; i += 2) {
+    if (((pairs >> (i / 2)) & 1u) == 0) continue;
+    /* 2^-32 and 2 pi 2^-32: never the logarithm of 0 */
     const SL_NOISE_REAL share =
         (SL_NOISE(noise_number)(words[i]) + SL_NOISE_NUMBER(0.5)) *
         SL_NOISE_NUMBER(2.3283064365386963e-10);
@@ -100,3 +107,4 @@ static inline void SL_NOISE(noise)(
 #undef SL_NOISE_REAL
 #undef SL_NOISE_WORD
 #undef SL_NOISE_NUMBER
+#undef SL_NOISE_PRODUCT

@@ -35,7 +35,7 @@ from springline.codegen.kernel import (
 )
 from springline.codegen.program import program
 from springline.model.hardware import SENSORS
-from springline.model.structure import Structure
+from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
 
 pytestmark = pytest.mark.usefixtures("other_arms")
@@ -81,7 +81,7 @@ void draw(uint64_t seed, uint64_t run, uint64_t first, int64_t samples, int64_t 
   for (k = 0; k < samples; k++) {{
     for (block = 0; block < blocks; block++, out += 4 * {lanes}) {{
       {vector} z[4];
-      {prefix}_noise(none + seed, runs, none + (first + (uint64_t)k), none + (uint64_t)block, z);
+      {prefix}_noise(none + seed, runs, none + (first + (uint64_t)k), none + (uint64_t)block, 3u, z);
       memcpy(out, z, sizeof z);
     }}
   }}
@@ -404,3 +404,16 @@ def test_a_run_has_one_number(numbers: tuple[int, ...]) -> None:
         kernel(KernelSpec(structure, True, options=KernelOptions(flags=QUICK, width=4))).run(
             values_of(structure)[None], LoopSettings(1, STEP), numbers=numbers
         )
+
+
+def test_only_pairs_that_a_sensor_shows_are_drawn() -> None:
+    def pairs(*effects: str, **more: Any) -> tuple[int, ...]:
+        return System(Structure(effects=effects, **more)).noise_pairs
+
+    assert pairs("position_noise", "velocity_noise") == (3, 3)
+    assert pairs("position_noise") == (1, 1)
+    assert pairs("velocity_noise") == (2, 2)
+    assert pairs("position_noise", drive="rigid") == (1,)
+    three = {"mechanism": "planar_arm", "size": 3, "reference": SignalShape("sine", (1,) * 3)}
+    assert pairs("position_noise", **three) == (3, 2, 1)  # of twelve, 0 to 2 and 6 to 8
+    assert pairs("position_resolution") == ()

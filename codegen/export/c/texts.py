@@ -85,7 +85,7 @@ def _values(export: Export, interface: TypedInterface) -> dict[str, Any]:
         "joints_count": system.n,
         "sensed": bool(system.measured),
         "differenced": system.structure.differenced,
-        "noise_blocks": -(-system.noise.numel() // 4),
+        "noise_pairs": system.noise_pairs,
         "seed": export.seed,
         "run": export.run,
         "has_law": system.controller.law is not None,
