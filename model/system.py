@@ -381,7 +381,7 @@ class System:
     def noise_pairs(self) -> tuple[int, ...]:
         """For each block of four entries of `noise`, which pairs a sensor shows: 1 the first, 2 the second, 3 both."""
         shown = ca.vertcat(*(self._shown[item] for item in self._seen_through))
-        used = ca.which_depends(shown, self.noise, 1, True) if self.noise.numel() else []
+        used = ca.which_depends(shown, self.noise) if self.noise.numel() else []
         return tuple(
             sum(bit for bit, pair in ((1, used[k : k + 2]), (2, used[k + 2 : k + 4])) if any(pair))
             for k in range(0, len(used), 4)
