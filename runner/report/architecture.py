@@ -11,7 +11,7 @@ import ast
 import itertools
 import sys
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from hashlib import sha256
 from pathlib import Path
 
@@ -33,6 +33,7 @@ Graph = Mapping[str, frozenset[str]]
 _FILLS = {"benchmarks": "#ececec", "runner": "#d5e6f5", "codegen": "#fbe0cd", "model": "#d6eedf"}
 _INK, _QUIET = "#1c2024", "#5b646c"
 _WIDTH, _HEIGHT, _STEP, _ROW = 1.62, 0.95, 1.92, 1.15  # of a room, and from one to the next, inches
+_ACROSS = 5  # rooms side by side
 
 
 def modules(root: Path) -> dict[str, frozenset[str]]:
@@ -143,7 +144,10 @@ def _package(axes: Axes, root: Path, package: str, graph: Graph, top: float) -> 
     columns: dict[int, list[str]] = {}
     for room in mine:
         columns.setdefault(level(graph, room), []).append(room)
-    height = 0.6 + _ROW * max((len(column) for column in columns.values()), default=0)
+    rows = [
+        max(len(columns[k]) for k in range(first, min(first + _ACROSS, len(columns)))) for first in _firsts(columns)
+    ]
+    height = 0.6 + _ROW * sum(rows)
     files = textwrap.wrap(f"own files: {', '.join(own_files(root, package))}", 150)
     height += 0.17 * (len(files) - 1)
     axes.add_patch(
@@ -162,18 +166,30 @@ def _package(axes: Axes, root: Path, package: str, graph: Graph, top: float) -> 
     axes.text(0.12, top - height + 0.08, "\n".join(files), fontsize=8, va="bottom", color=_QUIET, linespacing=1.25)
     places = {}
     for k, column in columns.items():
+        band, across = divmod(k, _ACROSS)
+        across = _ACROSS - 1 - across if band % 2 else across
         for row, room in enumerate(column):
-            shift = (max(map(len, columns.values())) - len(column)) / 2
-            places[room] = (0.22 + _STEP * k, top - 0.38 - _HEIGHT / 2 - _ROW * (row + shift))
+            shift = sum(rows[:band]) + (rows[band] - len(column)) / 2
+            places[room] = (0.22 + _STEP * across, top - 0.38 - _HEIGHT / 2 - _ROW * (row + shift))
             _room(axes, places[room], room.removeprefix(f"{package}.").replace(".", "/") + "/", idea(root, room))
     for room, others in reduced(graph).items():
         for other in sorted(others) if room in places else ():
             (x, y), (end, at) = places[room], places[other]
-            if x - end > 1.5 * _STEP:  # around what stands between them
+            band = level(graph, room) // _ACROSS
+            if band != level(graph, other) // _ACROSS:
+                _arrow(axes, (x + _WIDTH / 2, y + _HEIGHT / 2), (end + _WIDTH / 2, at - _HEIGHT / 2), 1.0)
+            elif band % 2:
+                _arrow(axes, (x + _WIDTH, y), (end, at), 1.0)
+            elif x - end > 1.5 * _STEP:  # around what stands between them
                 _arrow(axes, (x + _WIDTH / 2, y - _HEIGHT / 2), (end + _WIDTH, at), 1.0, way="angle,angleA=90,angleB=0")
             else:
                 _arrow(axes, (x, y), (end + _WIDTH, at), 1.0)
     return height
+
+
+def _firsts(columns: Sized) -> range:
+    """First levels of the bands in which levels run to the right and to the left by turns."""
+    return range(0, len(columns), _ACROSS)
 
 
 def _room(axes: Axes, place: tuple[float, float], name: str, text: str) -> None:
