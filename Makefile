@@ -13,7 +13,7 @@ PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-bui
 SHIPPED = $(shell find springline model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format docs docs-tables docs-controllers docs-hardware docs-sweeps docs-pictures math-accuracy prove firmware bench docs-bench clean FORCE
+.PHONY: help install reproduce test test-full lint format docs docs-tables docs-controllers docs-hardware docs-sweeps docs-first docs-pictures math-accuracy prove firmware bench docs-bench clean FORCE
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -54,6 +54,9 @@ docs-hardware: .venv/installed ## run the sweeps of docs/hardware.md, tables and
 
 docs-sweeps: .venv/installed ## run the sweeps of docs/batch.md and draw its pictures anew; takes minutes
 	$(BIN)/python -m benchmarks.sweep_pictures --write
+
+docs-first: .venv/installed ## simulate and draw the picture of README.md anew; takes a minute
+	$(BIN)/python -m benchmarks.first_picture --write
 
 docs-pictures: .venv/installed ## draw the pictures of docs/architecture.md and docs/conventions.md anew
 	$(BIN)/python -m runner.report.architecture

@@ -1,4 +1,4 @@
-"""Put what `springline bench` has measured into docs/performance.md.
+"""Put what `springline bench` has measured into docs/performance.md, and five rows of it into README.md.
 
     springline bench
     python -m benchmarks.docs_results [DIR]
@@ -13,9 +13,22 @@ from pathlib import Path
 
 from springline.runner.report import put
 
-PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
+ROOT = Path(__file__).parents[1]
+PAGE, README = ROOT / "docs" / "performance.md", ROOT / "README.md"
 NAME = "bench"
-"""The comments in the page between which the results stand."""
+"""The comments in the pages between which the results stand."""
+
+SHORT = ("springline", "handwritten C", "Numba", "CasADi C", "NumPy")
+"""The contenders of README.md."""
+
+
+def short(results: str) -> str:
+    """The table of README.md, of bench.md: ns of an evaluation with continuous and with sampled control, and ratios."""
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in results.splitlines() if line[:1] == "|"]
+    found = {(row[0], row[1]): f"{row[2]} ns" + ("" if row[3] == "1" else f" ({row[3]} ×)") for row in rows}
+    lines = ["| | continuous control | sampled at every step |", "|---|---:|---:|"]
+    lines += [f"| {name} | {found[name, 'continuous']} | {found[name, 'sampled']} |" for name in SHORT]
+    return "\n".join(lines) + "\n"
 
 
 def main() -> None:
@@ -25,9 +38,14 @@ def main() -> None:
     found = parser.parse_args().folder / "bench.md"
     if not found.exists():
         parser.error(f"there is no {found}: run `springline bench` first")
-    if not PAGE.is_file():
-        parser.error(f"there is no {PAGE}: run it in a checkout")
-    PAGE.write_text(put(PAGE.read_text("utf-8"), NAME, found.read_text("utf-8")), encoding="utf-8")
+    results = found.read_text("utf-8")
+    pages = {PAGE: results, README: short(results)}
+    for page in pages:
+        if not page.is_file():
+            parser.error(f"there is no {page}: run it in a checkout")
+    texts = {page: put(page.read_text("utf-8"), NAME, shown) for page, shown in pages.items()}
+    for page, text in texts.items():
+        page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

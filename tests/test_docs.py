@@ -31,7 +31,7 @@ from springline.runner.sweep import load_sweep
 ROOT = Path(__file__).parent.parent
 OTHERS = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "examples/README.md")]
 PAGES = [*OTHERS, *sorted((ROOT / "docs").glob("*.md"))]
-TUTORIAL = ROOT / "docs/tutorial.md"  # shows what is printed, and so has a test of its own
+SHOWING = (ROOT / "README.md", ROOT / "docs/tutorial.md")  # show what is printed, and so have a test of their own
 HOUSE = ROOT / "docs/architecture.md"  # changes springline itself, and so has a test of its own
 PROGRAMS = ("springline", "make", "pip", "python", "fmpy")
 STEPS = 100  # of every documented run
@@ -207,7 +207,7 @@ RUNNERS: dict[str, Callable[[Block], None]] = {"sh": run_shell, "python": run_py
 
 
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if page not in {HOUSE, TUTORIAL} and any(blocks(page))], ids=lambda page: page.name
+    "page", [page for page in PAGES if page not in {HOUSE, *SHOWING} and any(blocks(page))], ids=lambda page: page.name
 )
 @pytest.mark.usefixtures("place")
 def test_every_block_of_a_page_works(page: Path) -> None:
@@ -223,13 +223,13 @@ def test_what_is_run_elsewhere_is_documented() -> None:
     assert set(ELSEWHERE) <= shown
 
 
-# --- the tutorial ----------------------------------------------------------------------------------------
+# --- pages that show what is printed ----------------------------------------------------------------------------------------
 
 
 def output_of(block: Block) -> str:
     """Run a shell block, in the working directory; what its commands print."""
     printed = ""
-    for line in commands(block.text):
+    for line in (line for line in commands(block.text) if line not in ELSEWHERE):
         program, *arguments = shlex.split(line)
         if program == "springline":
             result = CliRunner().invoke(app, arguments, prog_name="springline")
@@ -253,8 +253,9 @@ def expect_shown(block: Block, printed: str) -> None:
 
 
 @pytest.mark.full
-def test_the_tutorial_prints_what_it_shows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, require_tool: Callable[..., str]
+@pytest.mark.parametrize("page", SHOWING, ids=lambda page: page.name)
+def test_a_page_s_commands_print_what_it_shows(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, require_tool: Callable[..., str]
 ) -> None:
     """With its runs in full length; the figures alone are not drawn."""
     require_tool("cc")
@@ -263,8 +264,10 @@ def test_the_tutorial_prints_what_it_shows(
         "springline.runner.report.figure_files", lambda name, _: {f"{name}.png": b"", f"{name}.svg": b""}
     )
     printed = ""
-    for block in blocks(TUTORIAL):
+    for block in blocks(page):
         match block.language:
+            case "python":
+                run_python(block)
             case "sh":
                 printed = output_of(block)
             case "text":

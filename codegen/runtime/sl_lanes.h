@@ -232,14 +232,15 @@ static inline sl_v slv_sqrt(sl_v x) {
 #error "SL_W must be 1, 2, 4, 8 or 16"
 #endif /* SL_W */
 
-/* A product of words of 32 bits in lanes of 64. GCC multiplies all 64 bits, in three products and their
- * sums; Clang sees that there are no more than 32. */
+/* A product of words of 32 bits in lanes of 64. GCC multiplies all 64 bits, in three products and
+ * their sums; Clang sees that there are no more than 32. */
 #if defined(__has_builtin) && !defined(__clang__)
 #if SL_W == 8 && defined(__AVX512F__)
 #if __has_builtin(__builtin_ia32_pmuludq512_mask)
 #define SL_HALVES(x) ((int __attribute__((vector_size(64))))(x))
+#define SL_WHOLES(x) ((long long __attribute__((vector_size(64))))(x))
 #define slv_word_product(a, b) \
-  ((sl_b)__builtin_ia32_pmuludq512_mask(SL_HALVES(a), SL_HALVES(b), (long long __attribute__((vector_size(64))))(a), 255))
+  ((sl_b)__builtin_ia32_pmuludq512_mask(SL_HALVES(a), SL_HALVES(b), SL_WHOLES(a), 255))
 #endif
 #elif SL_W == 4 && defined(__AVX2__)
 #if __has_builtin(__builtin_ia32_pmuludq256)

@@ -361,17 +361,23 @@ def test_the_page_has_the_results_as_the_benchmark_prints_them(
     assert {(ours.NAME, f"{mode}, 2 threads") for mode in problem.MODES} <= shown_lines
     assert all(re.search("^(reached|missed|not judged: .*)$", line[3]) for line in judgements)
 
-    copy = tmp_path / "performance.md"
-    copy.write_text(page, encoding="utf-8")
-    (tmp_path / "bench.md").write_text("anew\n")
+    readme = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
+    assert docs_results.short(shown) in readme
+    copies = [tmp_path / "performance.md", tmp_path / "README.md"]
+    anew = shown.replace("| handwritten C | continuous |", "| handwritten C | continuous | 1", 1)
+    (tmp_path / "bench.md").write_text(anew, encoding="utf-8")
     monkeypatch.setattr(docs_results, "PAGE", tmp_path / "nowhere.md")
     monkeypatch.setattr(sys, "argv", ["docs_results", str(tmp_path)])
     with pytest.raises(SystemExit):
         docs_results.main()
     assert "run it in a checkout" in capsys.readouterr().err
-    monkeypatch.setattr(docs_results, "PAGE", copy)
+    for name, copy, text in zip(("PAGE", "README"), copies, (page, readme), strict=True):
+        monkeypatch.setattr(docs_results, name, copy)
+        copy.write_text(text, encoding="utf-8")
     docs_results.main()
-    assert copy.read_text("utf-8") == page.replace(shown, "anew\n")
+    assert copies[0].read_text("utf-8") == page.replace(shown, anew)
+    assert copies[1].read_text("utf-8") == readme.replace(docs_results.short(shown), docs_results.short(anew))
+    assert docs_results.short(shown) != docs_results.short(anew)
     monkeypatch.setattr(sys, "argv", ["docs_results", str(tmp_path / "absent")])
     with pytest.raises(SystemExit):
         docs_results.main()

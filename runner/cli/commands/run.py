@@ -64,7 +64,7 @@ def run(
     force: Annotated[bool, typer.Option("--force", help="Replace results that DIR holds.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as JSON.")] = False,
 ) -> None:
-    """Simulate one scenario; write its tables and a report with figures.
+    """Simulate one scenario; write tables, figures, a report.
 
     report.html, trajectory, metrics, figures and the resolved scenario go into one folder. A run that diverges is a
     result: it is reported with the quantity and the time, and the exit code is 0.
