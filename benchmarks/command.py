@@ -36,6 +36,8 @@ def bench(
 
     Evaluations, agreement, compile times, and which of springline's aims are reached. Exit code 1 if a contender's
     result differs from springline's by more than its tolerance.
+
+    Example: springline bench --quick --only springline,numpy
     """
     from springline.benchmarks.aims import judge
     from springline.benchmarks.contenders import CONTENDERS

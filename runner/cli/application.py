@@ -8,89 +8,143 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import sys
 import traceback
-from importlib.metadata import entry_points
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO, cast
 
 import typer
-from typer.core import TyperGroup
 
-from springline.codegen.export import targets
-from springline.codegen.files import FolderConflict
-from springline.codegen.kernel import ToolchainError
-from springline.runner.cli.commands import analyze, batch, doctor, fmu, generate, listing, reproduce, run, target
+from springline.runner.cli.groups import Function, LazyGroup, Sources, example_epilog
 from springline.runner.cli.terminal import complain, say
-from springline.runner.files import InputError
+
+if TYPE_CHECKING:
+    from springline.codegen.export import Target
+
+_COMMANDS = "springline.runner.cli.commands"
+_PLUGINS = "springline.commands"
+_PLACES = {
+    "init": "init.init",
+    "run": "run.run",
+    "batch": "batch.batch",
+    "replay": "batch.replay",
+    "generate": "generate.generate",
+    "export": "",
+    "analyze": "analyze.analyze",
+    "reproduce": "reproduce.reproduce",
+    "list": "listing.list_",
+    "doctor": "doctor.doctor",
+    "cache": "cache.cache",
+}
+"""The commands in the order of the help, and where in the folder commands/ each is; `export` is a group."""
 
 _TRACEBACK = "SPRINGLINE_TRACEBACK"
 
 
-class Commands(TyperGroup):
+def _command(place: str) -> Callable[[], Function]:
+    """What imports a command, "module.function" of the folder commands/."""
+    module, _, function = place.rpartition(".")
+    return lambda: cast("Function", getattr(importlib.import_module(f"{_COMMANDS}.{module}"), function))
+
+
+class Exports(LazyGroup):
+    """The group `springline export`: a command for each target."""
+
+    def sources(self) -> Sources:
+        """The targets that have a command of their own, then those that need none."""
+        from springline.codegen.export import targets
+
+        def of(name: str, target: Target) -> Callable[[], Function]:
+            def command() -> Function:
+                from springline.runner.cli.commands.target import target_command
+
+                return target_command(name, target)
+
+            return command
+
+        own = {"c": _command("generate.export_c"), **{f"fmu{n}": _command(f"fmu.export_fmu{n}") for n in (2, 3)}}
+        return {**own, **{name: of(name, target) for name, target in targets().items()}}
+
+
+class Commands(LazyGroup):
     """The group of all commands. What a command raises for the user to read is one message, never a traceback."""
+
+    def sources(self) -> Sources:
+        """The commands of this package."""
+        return {name: None if name == "export" else _command(place) for name, place in _PLACES.items()}
+
+    def more(self) -> Sources:
+        """Those that other packages bring."""
+        from importlib.metadata import entry_points
+
+        return {entry.name: entry.load for entry in sorted(entry_points(group=_PLUGINS), key=lambda each: each.name)}
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; raises typer.Exit with the code of the failure."""
         try:
             return super().invoke(ctx)
-        except (InputError, FolderConflict) as error:
-            complain(f"Error: {error}")
-            raise typer.Exit(2) from error
         except BrokenPipeError:  # whoever read stdout has had enough; typer ends quietly
             raise
-        except (ToolchainError, OSError) as error:
-            complain(f"Error: {error}")
-            raise typer.Exit(1) from error
-        except MemoryError as error:
-            complain("Error: there is not enough memory for this")
-            raise typer.Exit(1) from error
         except KeyboardInterrupt as error:
             complain("stopped")
             raise typer.Exit(130) from error
         except Exception as error:
+            code = _told(error)
+            if code is None:
+                raise
+            raise typer.Exit(code) from error
+
+
+def _told(error: Exception) -> int | None:
+    """Tell the user what a command has raised; the exit code, or None for what is to be raised again."""
+    from springline.codegen.files import FolderConflict
+    from springline.codegen.kernel import ToolchainError
+    from springline.runner.files import InputError
+
+    match error:
+        case InputError() | FolderConflict():
+            complain(f"Error: {error}")
+            return 2
+        case ToolchainError() | OSError():
+            complain(f"Error: {error}")
+        case MemoryError():
+            complain("Error: there is not enough memory for this")
+        case _:
             if isinstance(error, typer.Abort) or hasattr(error, "exit_code"):  # typer's own, told by typer
-                raise
+                return None
             if os.environ.get(_TRACEBACK):
-                raise
+                return None
             place = traceback.extract_tb(error.__traceback__)[-1]
             complain(
                 f"Error: a fault of springline itself: {type(error).__name__}: {error} ({Path(place.filename).name}, "
                 f"line {place.lineno}). Please report it; {_TRACEBACK}=1 shows how it came to that."
             )
-            raise typer.Exit(1) from error
+    return 1
 
 
 app = typer.Typer(
     name="springline",
     cls=Commands,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=example_epilog("springline run paper/nominal"),
 )
 
-export = typer.Typer(no_args_is_help=True, help="Export a scenario's controller and plant for other programs.")
-
-app.command("run")(run.run)
-app.command("batch")(batch.batch)
-app.command("replay")(batch.replay)
-app.command("generate")(generate.generate)
-export.command("c")(generate.export_c)
-export.command("fmu2")(fmu.export_fmu2)
-export.command("fmu3")(fmu.export_fmu3)
-for name, found in targets().items():
-    export.command(name)(target.target_command(name, found))
-app.add_typer(export, name="export")
-app.command("analyze")(analyze.analyze)
-app.command("reproduce")(reproduce.reproduce)
-for entry in sorted(entry_points(group="springline.commands"), key=lambda entry: entry.name):
-    app.command(entry.name)(entry.load())
-app.command("list")(listing.list_)
-app.command("doctor")(doctor.doctor)
+app.add_typer(
+    typer.Typer(
+        cls=Exports,
+        no_args_is_help=True,
+        help="Export a scenario's controller and plant for other programs.",
+        epilog=example_epilog("springline export c paper/nominal -o generated"),
+    ),
+    name="export",
+)
 
 
 def _show_version(wanted: bool) -> None:

@@ -5,11 +5,11 @@ from .control_tables import table_in as table_in
 from .dotted import canonical_key as canonical_key
 from .dotted import expect_keys as expect_keys
 from .locate import expect_kind as expect_kind
-from .locate import packaged_scenarios as packaged_scenarios
-from .locate import packaged_sweeps as packaged_sweeps
 from .locate import read_sweep as read_sweep
-from .locate import scenarios_folder as scenarios_folder
 from .numeric_keys import NumericKey as NumericKey
+from .packaged import packaged_scenarios as packaged_scenarios
+from .packaged import packaged_sweeps as packaged_sweeps
+from .packaged import scenarios_folder as scenarios_folder
 from .scenario import Scenario as Scenario
 from .scenario import Slots as Slots
 from .scenario import absent_at as absent_at

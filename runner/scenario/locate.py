@@ -6,14 +6,19 @@ import errno
 import os
 import shlex
 import stat
-from collections.abc import Iterator, Mapping
-from importlib import resources
-from importlib.resources.abc import Traversable
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
 from springline.runner.files import InputError, Problem, read_toml, unknown
 from springline.runner.scenario import schema
+from springline.runner.scenario.packaged import (
+    packaged_file,
+    packaged_names,
+    packaged_scenarios,
+    packaged_sweeps,
+    scenarios_folder,
+)
 
 PACKAGED = "springline:"
 """A path that begins so is that of a file beside the packaged scenarios: "springline:data/vessel_orcaflex_10hz.csv"."""
@@ -41,34 +46,6 @@ def kind_of(document: Mapping[str, object]) -> Kind:
     if any(key in document for key in _SWEEPS_OWN):
         return "sweep"
     return "scenario" if any(key in document for key in schema.TABLES) else ""
-
-
-def packaged_scenarios() -> tuple[str, ...]:
-    """Names of the scenarios that come with springline, sorted."""
-    return tuple(sorted(name for name in _packaged(scenarios_folder(), ".toml") if not name.startswith("sweeps/")))
-
-
-def scenarios_folder() -> Traversable:
-    """The folder of the packaged scenarios."""
-    return resources.files("springline.runner") / "scenarios"
-
-
-def _packaged_file(name: str) -> Traversable:
-    return scenarios_folder().joinpath(*name.split("/"))
-
-
-def _packaged(folder: Traversable, suffix: str, prefix: str = "") -> Iterator[str]:
-    """Names of the packaged files below `folder`, with slashes; without the suffix if it is ".toml"."""
-    for item in folder.iterdir():
-        if item.is_dir():
-            yield from _packaged(item, suffix, f"{prefix}{item.name}/")
-        elif item.name.endswith(suffix):
-            yield prefix + (item.name.removesuffix(suffix) if suffix == ".toml" else item.name)
-
-
-def packaged_sweeps() -> tuple[str, ...]:
-    """Names of the sweeps that come with springline, sorted."""
-    return tuple(sorted(_packaged(scenarios_folder() / "sweeps", ".toml")))
 
 
 def expect_kind(wanted: Kind, source: str | Path, document: Mapping[str, object] | None = None) -> None:
@@ -120,7 +97,7 @@ def read_scenario(source: str | Path) -> tuple[str, Path]:
     """
     name = str(source) or "."
     if not isinstance(source, Path) and name in packaged_scenarios():
-        file = _packaged_file(f"{name}.toml")
+        file = packaged_file(f"{name}.toml")
         return file.read_text("utf-8"), Path(str(file)).parent
     path = Path(source)
     if os.path.exists(path) and path.suffix != ".toml":  # Path.exists raises for names that no file can have
@@ -226,10 +203,10 @@ def read_signal_file(path: str, where: str, key: str) -> bytes:
     """
     if path.startswith(PACKAGED):
         name = path.removeprefix(PACKAGED)
-        names = sorted(_packaged(scenarios_folder(), ".csv"))
+        names = sorted(packaged_names(scenarios_folder(), ".csv"))
         if name not in names:
             raise InputError(unknown(where, key, "packaged file", path, [PACKAGED + n for n in names]))
-        return _packaged_file(name).read_bytes()
+        return packaged_file(name).read_bytes()
     file = Path(path)
     try:
         return _contents(file, _LARGEST_SIGNAL_FILE)

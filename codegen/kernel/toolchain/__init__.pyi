@@ -1,4 +1,6 @@
 from .cache import build_library as build_library
+from .cache import cached as cached
+from .cache import clear_cache as clear_cache
 from .cache import load as load
 from .compiler import Compiler as Compiler
 from .compiler import find_compiler as find_compiler
@@ -9,3 +11,4 @@ from .compiler import probe_compiler as probe_compiler
 from .doctor import Check as Check
 from .doctor import checks as checks
 from .errors import ToolchainError as ToolchainError
+from .errors import cache_root as cache_root

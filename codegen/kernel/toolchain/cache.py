@@ -12,6 +12,7 @@ import fcntl
 import hashlib
 import json
 import os
+import re
 import shlex
 import shutil
 import stat
@@ -20,6 +21,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 from springline.codegen.kernel.toolchain.compiler import Compiler, find_compiler, predefined_macros, run_compiler
 from springline.codegen.kernel.toolchain.errors import ANOTHER_FOLDER, ToolchainError, cache_root
@@ -29,6 +31,7 @@ BASE_FLAGS = ("-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-Wall
 
 _LIBRARY = "library.so"
 _CHECKSUM = "library.sha256"
+_KEY = re.compile("[0-9a-f]{64}")
 
 
 def build_library(
@@ -86,6 +89,61 @@ def load(library: Path) -> ctypes.CDLL:
         return ctypes.CDLL(os.fspath(library))
     except OSError as error:
         raise ToolchainError(f"cannot load the compiled library: {error}") from error
+
+
+class Cached(NamedTuple):
+    """Compiled libraries: how many, and how many bytes; `busy` of them are being built by a process at this moment."""
+
+    libraries: int
+    bytes: int
+    busy: int = 0
+
+
+def cached() -> Cached:
+    """What the cache holds. Raises ToolchainError where there is no folder for it, OSError if it cannot be read."""
+    sizes = [_size(entry) for entry in _entries()]
+    return Cached(sum(size > 0 for size in sizes), sum(sizes))
+
+
+def clear_cache() -> Cached:
+    """Remove all libraries; what was removed.
+
+    One that a process builds at this moment stays. Lock files stay, too: whoever waits for one must find that others
+    wait for the same. What a running process has loaded goes on working. Raises as `cached` does.
+    """
+    libraries = size = busy = 0
+    for entry in _entries():
+        with _locked(entry / "lock", wait=False) as mine:
+            if mine is None:
+                busy += 1
+                continue
+            freed = _size(entry)
+            for leftover in entry.glob("build-*"):
+                shutil.rmtree(leftover, ignore_errors=True)
+            for name in (_LIBRARY, _CHECKSUM):
+                (entry / name).unlink(missing_ok=True)
+            libraries, size = libraries + (freed > 0), size + freed
+    return Cached(libraries, size, busy)
+
+
+def _entries() -> list[Path]:
+    """The folders of libraries; whatever else somebody has put beside them is not ours."""
+    root = cache_root()
+    if not root.is_dir():
+        return []
+    return sorted(place for place in root.iterdir() if _KEY.fullmatch(place.name) and _is_folder(place))
+
+
+def _is_folder(place: Path) -> bool:
+    return place.is_dir() and not place.is_symlink()
+
+
+def _size(entry: Path) -> int:
+    """Bytes of an entry's library; 0 if it has none."""
+    try:
+        return (entry / _LIBRARY).stat().st_size
+    except FileNotFoundError:
+        return 0
 
 
 def _expect_trusted(root: Path, entry: Path) -> None:
@@ -178,15 +236,17 @@ def _checksum(entry: Path, library: Path) -> str:
 
 
 @contextlib.contextmanager
-def _locked(path: Path) -> Iterator[bool]:
-    """Hold the lock on `path`; yields False where the file system has no locks.
+def _locked(path: Path, *, wait: bool = True) -> Iterator[bool | None]:
+    """Hold the lock on `path`; yields False where the file system has no locks, None if it is held and we do not wait.
 
     The lock saves double work and lets us clear up after a killed build. It is not what keeps the cache
     sound: renames and checksums do, so a file system without locks (some cluster homes) will do.
     """
     with path.open("a") as file:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX)
+            fcntl.flock(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield None
         except OSError as error:
             if error.errno not in (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP):
                 raise

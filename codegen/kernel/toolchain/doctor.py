@@ -4,7 +4,12 @@ import shlex
 from typing import NamedTuple
 
 from springline.codegen.kernel.toolchain.cache import build_library, load
-from springline.codegen.kernel.toolchain.compiler import find_compiler, native_flags, native_vector_width
+from springline.codegen.kernel.toolchain.compiler import (
+    find_compiler,
+    native_flags,
+    native_instruction_set,
+    native_vector_width,
+)
 from springline.codegen.kernel.toolchain.errors import ToolchainError, cache_root
 
 
@@ -31,6 +36,7 @@ def checks() -> list[Check]:
         Check("compiler version", f"{compiler.family} {compiler.version}", True),
         Check("target", compiler.target, True),
         Check("native flags", shlex.join(native_flags(compiler)) or "(none)", True),
+        Check("instruction set", native_instruction_set(compiler), True),
         Check("vector width", f"{native_vector_width(compiler)} doubles", True),
         cache,
     ]

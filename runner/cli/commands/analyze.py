@@ -43,6 +43,8 @@ def analyze(
 
     Time scales, stability and its boundaries, margins, the proof's reach: from the linearised equations, a verdict
     each. With -o a report with figures. An unstable design is a result too, and the exit code is 0.
+
+    Example: springline analyze paper/nominal --range plant.m3.scale=0.8,1.2
     """
     from springline.runner.analysis import analyze as examine
     from springline.runner.scenario import load_scenario

@@ -60,6 +60,8 @@ def batch(
 
     A summary and figures come with it. Ctrl-C, and even a crash, loses no more than the runs under way: --resume goes
     on from there.
+
+    Example: springline batch gains -o gains --set simulation.duration=2.0
     """
     from springline.runner.sweep import (
         Dataset,
@@ -294,6 +296,8 @@ def replay(
     """Simulate one run of a dataset again, trajectory included.
 
     The metrics must come out as the dataset has them, to the last bit; if they do not, the exit code is 1.
+
+    Example: springline replay gains 17 -o run_17
     """
     from springline.runner.cli.commands.run import OUTPUTS, print_metrics
     from springline.runner.cli.options import refuse_occupied

@@ -114,7 +114,9 @@ def _command(version: Literal[2, 3]) -> Callable[..., None]:
         else:
             say(f"{output / path}: FMI {version}.0, {len(content) // 1024} KiB, {done}")
 
-    command.__doc__ = f"Write an FMU for Co-Simulation, FMI {version}.0."
+    command.__doc__ = f"""Write an FMU for Co-Simulation, FMI {version}.0.
+
+    Example: springline export fmu{version} paper/nominal --part controller -o fmu"""
     return command
 
 

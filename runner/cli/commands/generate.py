@@ -22,9 +22,18 @@ generate = tree_command(
     "generate",
     """Generate the C of a scenario: controller, plant and model.
 
-    Its parameters are constants, but for those that --tunable names.""",
+    Its parameters are constants, but for those that --tunable names.
+
+    Example: springline generate paper/nominal --tunable control.k1,control.k2""",
     _tree,
     folder="generated",
     default=DEFAULT,
 )
-export_c = tree_command("export c", "The same files as `springline generate SCENARIO`.", _tree, folder="generated")
+export_c = tree_command(
+    "export c",
+    """The same files as `springline generate SCENARIO`.
+
+    Example: springline export c paper/nominal -o generated""",
+    _tree,
+    folder="generated",
+)

@@ -45,6 +45,8 @@ def list_(
     """List mechanisms, controllers, laws, scenarios and the like.
 
     With a scenario, the parameters of its own arm, drive and controller, and their values.
+
+    Example: springline list parameters paper/nominal
     """
     if scenario and what is not What.parameters:
         raise InputError(Problem(scenario, "", f"only goes with springline list parameters, not with {what.value}"))

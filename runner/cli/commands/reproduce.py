@@ -30,6 +30,8 @@ def reproduce(
     """Repeat the reference paper, number by number.
 
     Its runs, tables, figures and claims, in one report. A claim that fails is a result too, and the exit code is 0.
+
+    Example: springline reproduce --group 1 -o reproduction
     """
     from springline.runner.paper import GROUPS
     from springline.runner.paper import reproduce as repeat

@@ -68,6 +68,8 @@ def run(
 
     report.html, trajectory, metrics, figures and the resolved scenario go into one folder. A run that diverges is a
     result: it is reported with the quantity and the time, and the exit code is 0.
+
+    Example: springline run paper/group1_shake --set control.delta=0.03 -o shake
     """
     from springline.runner.files import table_files, units, write_folder
     from springline.runner.run import report_files, simulate, trajectory_hash

@@ -141,7 +141,8 @@ def target_command(name: str, target: Target) -> Callable[..., None]:
 
         return target_files(name, export), {"kind": name, "hash": export.sha256, "options": made_with(export)}
 
-    return tree_command(f"export {name}", target.title, tree, folder=name, options=target.options)
+    description = f"{target.title}\n\nExample: springline export {name} paper/nominal"
+    return tree_command(f"export {name}", description, tree, folder=name, options=target.options)
 
 
 def _write(
