@@ -223,7 +223,7 @@ def test_what_is_run_elsewhere_is_documented() -> None:
     assert set(ELSEWHERE) <= shown
 
 
-# --- pages that show what is printed ----------------------------------------------------------------------------------------
+# --- pages that show what is printed -----------------------------------------------------------------------
 
 
 def output_of(block: Block) -> str:

@@ -13,11 +13,14 @@ from typing import Annotated, Literal
 import typer
 
 from springline.codegen.files import TEMPORARY
+from springline.runner.cli.completion import scenario_names
 from springline.runner.files import InputError, Problem, read_toml
 
 _BARE_WORD = re.compile(r"([^\W\d]|\.{0,2}/)[\w.:/+-]*")
 
-ScenarioName = Annotated[str, typer.Argument(help="A TOML file, or the name of a packaged scenario.")]
+ScenarioName = Annotated[
+    str, typer.Argument(help="A TOML file, or the name of a packaged scenario.", autocompletion=scenario_names)
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that springline did not write.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print what was done to each file as JSON.")]
 Changes = Annotated[
@@ -33,9 +36,9 @@ Changes = Annotated[
 
 def _refuse(context: typer.Context, refused: bool) -> bool:
     """Refuse code until the command ends: whoever calls commands from Python goes on as before."""
-    from springline.runner.scenario import without_code
-
     if refused:
+        from springline.runner.scenario import without_code
+
         context.with_resource(without_code())
     return refused
 

@@ -1,7 +1,12 @@
+from .arrow import arrow_array as arrow_array
+from .arrow import arrow_numbers as arrow_numbers
+from .arrow import arrow_texts as arrow_texts
 from .errors import InputError as InputError
 from .errors import Problem as Problem
 from .errors import shortened as shortened
 from .errors import unknown as unknown
+from .frames import to_pandas as to_pandas
+from .frames import to_polars as to_polars
 from .storage import parquet_bytes as parquet_bytes
 from .storage import table_files as table_files
 from .storage import units as units

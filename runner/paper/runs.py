@@ -314,4 +314,4 @@ def _linear(scenario: Scenario) -> Result:
     settings = LoopSettings(scenario.steps, scenario.step, scenario.bound, output_every=scenario.output_every)
     runs = kernel(KernelSpec(structure, options=ONE_RUN)).run(values[None, :], settings)
     assert runs.trajectory is not None
-    return Result(trajectory_table(system, runs.trajectory[0]), pa.table({"status": ["ok"]}), "ok", "")
+    return Result(trajectory_table(system, runs.trajectory[0]), pa.table({"status": ["ok"]}), "ok", "", scenario)

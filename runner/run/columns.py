@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from springline.codegen.kernel import METRICS, STATUS, Runs
 from springline.model.system import System
+from springline.runner.files import arrow_numbers, arrow_texts
 
 Floats = NDArray[np.float64]
 
@@ -41,14 +40,14 @@ def metrics_schema(*systems: System) -> pa.Schema:
 
 def trajectory_table(system: System, rows: Floats) -> pa.Table:
     """A trajectory, of the loop's rows (times, columns)."""
-    return pa.Table.from_arrays([_numbers(column) for column in rows.T], schema=trajectory_schema(system))
+    return pa.Table.from_arrays([arrow_numbers(column) for column in rows.T], schema=trajectory_schema(system))
 
 
 def metrics_table(system: System, runs: Runs) -> pa.Table:
     """Metrics of all runs, one row each."""
-    columns = [_numbers(runs.metrics[:, j, k], null=True) for k in range(len(METRICS)) for j in range(system.n)]
-    status = _texts([STATUS[i] for i in runs.status])
-    return pa.Table.from_arrays([*columns, status, _numbers(runs.end_time)], schema=metrics_schema(system))
+    columns = [arrow_numbers(runs.metrics[:, j, k], null=True) for k in range(len(METRICS)) for j in range(system.n)]
+    status = arrow_texts([STATUS[i] for i in runs.status])
+    return pa.Table.from_arrays([*columns, status, arrow_numbers(runs.end_time)], schema=metrics_schema(system))
 
 
 def values(column: pa.ChunkedArray) -> Floats:
@@ -58,17 +57,3 @@ def values(column: pa.ChunkedArray) -> Floats:
     """
     parts = [np.from_dlpack(part) for part in (column.fill_null(np.nan) if column.null_count else column).chunks]
     return np.asarray(parts[0] if len(parts) == 1 else np.concatenate([np.zeros(0), *parts]), dtype=np.float64)
-
-
-# pa.array imports pandas where that is installed, to ask whether what it is given is pandas': longer than a run takes.
-def _numbers(values: Floats, *, null: bool = False) -> pa.Array:
-    """Doubles as they are, NaN as null if asked."""
-    missing = np.isnan(values)
-    valid = pa.py_buffer(np.packbits(~missing, bitorder="little")) if null and missing.any() else None
-    return pa.Array.from_buffers(pa.float64(), len(values), [valid, pa.py_buffer(np.ascontiguousarray(values))])
-
-
-def _texts(values: Sequence[str]) -> pa.Array:
-    parts = [value.encode() for value in values]
-    ends = np.cumsum([0, *map(len, parts)], dtype=np.int32)
-    return pa.StringArray.from_buffers(len(parts), pa.py_buffer(ends), pa.py_buffer(b"".join(parts)))

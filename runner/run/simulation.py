@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -25,17 +26,22 @@ from springline.codegen.kernel import (
 from springline.model.parameters import Joint
 from springline.model.quantities import entries
 from springline.model.system import System
+from springline.runner.files import to_pandas, to_polars
 from springline.runner.run.columns import metrics_table, trajectory_table
 from springline.runner.run.crew import Crew, results
 from springline.runner.run.limits import refuse_large
 from springline.runner.run.settings import kernel_structure, loop_settings
+from springline.runner.run.shown import figure_of, line_of, page_of
 from springline.runner.scenario import Scenario, expect_scenario, kernel_tables
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Result:
     """What a run gave.
 
@@ -44,12 +50,39 @@ class Result:
     status      "ok", "diverged", "out_of_bounds" or "out_of_limits"
     message     one sentence: for a run that stopped, the quantity and the time at which it left its bound; for one that
                 chatters, how much
+    scenario    what was simulated
     """
 
     trajectory: pa.Table
     metrics: pa.Table
     status: str
     message: str
+    scenario: Scenario
+
+    def __repr__(self) -> str:
+        """Status, size of the trajectory, message."""
+        return line_of(self)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: message, metrics and a figure."""
+        return page_of(self)
+
+    def plot(self, name: str = "tracking") -> Figure:
+        """One figure of the run, as `springline run` draws it.
+
+        name  "tracking", "error", "force"; "sliding", "phase_plane", "springs", "base_motion", "disturbance",
+              "measured", "controller_states", "tip" where there is such a thing
+        Raises ValueError, with the names that there are, for any other.
+        """
+        return figure_of(self, name)
+
+    def to_pandas(self) -> Any:
+        """The trajectory as a pandas.DataFrame, the units in its ``attrs["units"]``; see `to_pandas` for any table."""
+        return to_pandas(self.trajectory)
+
+    def to_polars(self) -> Any:
+        """The trajectory as a polars.DataFrame, columns named with their units; see `to_polars` for any table."""
+        return to_polars(self.trajectory)
 
 
 def outcome(system: System, runs: Runs, run: int, settings: LoopSettings) -> tuple[str, str]:
@@ -112,4 +145,4 @@ def simulate(scenario: Scenario, *, engine: Engine = "lanes", progress: Progress
     rows = runs.trajectory[0, : runs.rows[0]]
     trajectory = trajectory_table(system, rows)
     status, message = outcome(system, runs, 0, settings)
-    return Result(trajectory, metrics_table(system, runs), status, message)
+    return Result(trajectory, metrics_table(system, runs), status, message, scenario)

@@ -1,4 +1,4 @@
-"""Scenarios and sweeps that come with springline: their names, for lists and shells that must not wait for the model."""
+"""Names of the packaged scenarios and sweeps, for lists and shells that must not wait for the model."""
 
 from __future__ import annotations
 

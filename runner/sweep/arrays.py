@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from springline.codegen.kernel import Runs, joined
 from springline.codegen.memory import memory
-from springline.runner.files import InputError, Problem
+from springline.runner.files import InputError, Problem, arrow_array, arrow_numbers
 from springline.runner.run import field as unit_field
 from springline.runner.run import metrics_schema, metrics_table, results
 from springline.runner.scenario import Scenario, absent_at, expect_keys, expect_scenario
@@ -62,8 +62,8 @@ def batch(scenario: Scenario, columns: Mapping[str, ArrayLike], *, jobs: int | N
     result = metrics_table(work.system, _over_threads(work, work.chosen(slots, runs), jobs))
     keys = scenario.numeric_keys()
     for position, (key, array) in enumerate(arrays.items()):
-        result = result.add_column(position, unit_field(key, keys[key].unit), pa.array(array, pa.float64()))
-    return result.add_column(0, unit_field("run", "", pa.int64()), pa.array(np.arange(runs)))
+        result = result.add_column(position, unit_field(key, keys[key].unit), arrow_numbers(array))
+    return result.add_column(0, unit_field("run", "", pa.int64()), arrow_array(np.arange(runs), pa.int64()))
 
 
 def _over_threads(work: Work, parameters: Floats, jobs: int | None) -> Runs:

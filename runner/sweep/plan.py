@@ -20,7 +20,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from springline.model.parameters import Joint
-from springline.runner.files import InputError, Problem, unknown, value_text
+from springline.runner.files import InputError, Problem, arrow_array, unknown, value_text
 from springline.runner.run import field, metrics_schema, metrics_table, trajectory_schema
 from springline.runner.scenario import (
     CHOOSERS,
@@ -261,7 +261,7 @@ class Plan:
         """
         runs, scenario = np.arange(chunk.first, chunk.first + chunk.runs), chunk.group.scenario
         keys = [
-            pa.array(columns[item.name], item.type)
+            arrow_array(columns[item.name], item.type)
             if self._counts(item.name, scenario)
             else pa.nulls(len(runs), item.type)
             for item in self.key_fields
@@ -271,7 +271,7 @@ class Plan:
             found[item.name] if item.name in found.column_names else pa.nulls(len(runs), item.type)
             for item in self._metrics
         ]
-        return pa.Table.from_arrays([pa.array(runs), *keys, *metrics], schema=self.schema)
+        return pa.Table.from_arrays([arrow_array(runs, pa.int64()), *keys, *metrics], schema=self.schema)
 
     @cached_property
     def schema(self) -> pa.Schema:

@@ -105,7 +105,7 @@ def content_hash(table: pa.Table) -> str:
     for field, chunked in zip(table.schema, table.columns, strict=True):
         digest.update(f"{field.type} {len(chunked)}\n".encode())
         column = chunked.combine_chunks()
-        digest.update(np.asarray(column.is_valid().to_numpy(zero_copy_only=False), dtype=np.uint8).tobytes())
+        digest.update(compute.cast(column.is_valid(), pa.uint8()).to_numpy().tobytes())
         if pa.types.is_string(field.type):
             texts = [text.encode() for text in column.fill_null("").to_pylist()]
             digest.update(np.array([len(text) for text in texts], dtype="<i8").tobytes())

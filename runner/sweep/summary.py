@@ -18,7 +18,7 @@ from pyarrow import compute
 
 from springline.codegen.kernel import METRICS, STATUS, chatters
 from springline.model.parameters import Joint
-from springline.runner.files import units
+from springline.runner.files import arrow_array, units
 from springline.runner.sweep import sampling
 from springline.runner.sweep.dataset import Dataset
 from springline.runner.sweep.plan import Chunk, Plan
@@ -90,11 +90,11 @@ def summarize(plan: Plan, dataset: Dataset, done: Collection[int] | None = None)
         for outcome in OUTCOMES:
             outcomes[names[chunk.group.number]][outcome] += int(np.count_nonzero(_ended(table, outcome)))
         outcomes[names[chunk.group.number]][CHATTERED] += int(np.count_nonzero(chattering(table, joints)))
-        picked = table.filter(pa.array(_picked(chunk, runs)))
+        picked = table.filter(arrow_array(_picked(chunk, runs), pa.bool_()))
         for name, column in gathered.items():
             column[row : row + len(picked)] = picked[name].to_numpy()
         row += len(picked)
-    shown = pa.table([pa.array(gathered.pop(f.name), f.type, from_pandas=True) for f in plan.schema], plan.schema)
+    shown = pa.table([arrow_array(gathered.pop(f.name), f.type, null=True) for f in plan.schema], plan.schema)
     metrics = _distributions(dataset, parts, shown, joints)
     worst, best = _extremes(dataset, parts, metrics, joints)
     return Summary(runs, outcomes, metrics, units(shown), worst, best, shown)
@@ -153,7 +153,7 @@ def chattering(table: pa.Table, joints: Sequence[Joint]) -> NDArray[np.bool_]:
 
 def _ended(table: pa.Table, outcome: str) -> NDArray[np.bool_]:
     """Which runs ended so."""
-    return np.asarray(compute.equal(table["status"], outcome).to_numpy(), dtype=np.bool_)
+    return np.asarray(compute.cast(compute.equal(table["status"], outcome), pa.uint8()).to_numpy(), dtype=np.bool_)
 
 
 def _badness(table: pa.Table, scales: Mapping[str, float]) -> Floats:

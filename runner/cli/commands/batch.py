@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from springline.runner.cli.amounts import size_text, time_text
+from springline.runner.cli.completion import sweep_names
 from springline.runner.cli.options import Changes, NoCode, overrides
 from springline.runner.cli.terminal import complain, console, print_json, print_table, say
 
@@ -31,7 +32,9 @@ _PACKAGED = (
 
 
 def batch(
-    sweep: Annotated[str, typer.Argument(help=f"A TOML file, or a packaged sweep: {_PACKAGED}.")],
+    sweep: Annotated[
+        str, typer.Argument(help=f"A TOML file, or a packaged sweep: {_PACKAGED}.", autocompletion=sweep_names)
+    ],
     output: Annotated[
         str,
         typer.Option(

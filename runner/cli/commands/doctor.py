@@ -28,10 +28,14 @@ _EXTRAS = {
 
 # Programs, what they are for, and the packages of Debian and Ubuntu that have them.
 _PROGRAMS = (
-    ("firmware for Cortex-M", ("arm-none-eabi-gcc", "qemu-system-arm"), "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"),
-    ("cross compile: aarch64", ("aarch64-linux-gnu-gcc", "qemu-aarch64"), "gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user"),
-    ("cross compile: riscv64", ("riscv64-linux-gnu-gcc", "qemu-riscv64"), "gcc-riscv64-linux-gnu libc6-dev-riscv64-cross qemu-user"),
-    ("cross compile: s390x", ("s390x-linux-gnu-gcc", "qemu-s390x"), "gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user"),
+    ("firmware for Cortex-M", ("arm-none-eabi-gcc", "qemu-system-arm"),
+     "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"),
+    ("cross compile: aarch64", ("aarch64-linux-gnu-gcc", "qemu-aarch64"),
+     "gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user"),
+    ("cross compile: riscv64", ("riscv64-linux-gnu-gcc", "qemu-riscv64"),
+     "gcc-riscv64-linux-gnu libc6-dev-riscv64-cross qemu-user"),
+    ("cross compile: s390x", ("s390x-linux-gnu-gcc", "qemu-s390x"),
+     "gcc-s390x-linux-gnu libc6-dev-s390x-cross qemu-user"),
     ("cross compile: AVR", ("avr-gcc", "simavr"), "gcc-avr avr-libc simavr"),
     ("CMake project", ("cmake", "pkg-config"), "cmake pkg-config"),
     ("proofs of rounding errors", ("gappa",), "gappa"),
@@ -64,9 +68,10 @@ def doctor(
     if all(row.ok for row in rows):
         rows.append(_engines())
     fine = all(row.ok for row in rows)
-    further = [*extras, *map(_programs, *zip(*_PROGRAMS, strict=True))]
+    further = [*extras, *(_programs(*row) for row in _PROGRAMS)]
+    everything: list[Check | Capability] = [*rows, *further]
     if as_json:
-        print_json("doctor", [row._asdict() for row in (*rows, *further)], {}, "ok" if fine else "failed")
+        print_json("doctor", [row._asdict() for row in everything], {}, "ok" if fine else "failed")
     else:
         say(f"springline {__version__}")
         for title, shown in (("needed", rows), ("further uses", further)):

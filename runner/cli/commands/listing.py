@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from springline.runner.cli.completion import scenario_names
 from springline.runner.cli.options import Changes, NoCode, overrides
 from springline.runner.cli.terminal import complain, print_json, print_table
 from springline.runner.files import InputError, Problem
@@ -36,7 +37,11 @@ def list_(
     what: Annotated[What, typer.Argument(help="Which list.")],
     scenario: Annotated[
         str,
-        typer.Argument(help="Whose parameters: a TOML file, or the name of a packaged scenario.", show_default=False),
+        typer.Argument(
+            help="Whose parameters: a TOML file, or the name of a packaged scenario.",
+            show_default=False,
+            autocompletion=scenario_names,
+        ),
     ] = "",
     changes: Changes = None,
     no_code: NoCode = False,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from springline.runner.cli.completion import scenario_names
 from springline.runner.cli.options import Changes, NoCode, overrides, refuse_occupied
 from springline.runner.cli.terminal import complain, number, print_json, print_table, progress, say
 from springline.runner.files import InputError, Problem
@@ -47,7 +48,10 @@ class Format(StrEnum):
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="A TOML file, or a packaged scenario: paper/group1_shake.")],
+    scenario: Annotated[
+        str,
+        typer.Argument(help="A TOML file, or a packaged scenario: paper/group1_shake.", autocompletion=scenario_names),
+    ],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", show_default="results/SCENARIO", help="Folder for the results."),

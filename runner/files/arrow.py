@@ -1,0 +1,46 @@
+"""Arrow arrays of NumPy's, made without pandas.
+
+pa.array imports pandas where that is installed, to ask whether what it is given is pandas': longer than a run takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+
+def arrow_array(values: Any, kind: pa.DataType, *, null: bool = False) -> pa.Array:
+    """An array of the type `kind`; NaN and None are null if asked.
+
+    Numbers, truth values and texts are copied as they are; for anything else Arrow is asked, at the price above.
+    """
+    if kind in {pa.float64(), pa.int64()}:
+        return _numbers(np.ascontiguousarray(values, kind.to_pandas_dtype()), kind, null=null and kind == pa.float64())
+    if kind == pa.bool_():
+        packed = np.packbits(np.asarray(values, np.bool_), bitorder="little")
+        return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(packed)])
+    if kind == pa.string() and all(isinstance(value, str) for value in values):
+        return arrow_texts(values)
+    return pa.array(values, kind, from_pandas=null)
+
+
+def arrow_texts(values: Sequence[str]) -> pa.Array:
+    """Texts."""
+    parts = [value.encode() for value in values]
+    ends = np.cumsum([0, *map(len, parts)], dtype=np.int32)
+    return pa.StringArray.from_buffers(len(parts), pa.py_buffer(ends), pa.py_buffer(b"".join(parts)))
+
+
+def arrow_numbers(values: NDArray[np.float64], *, null: bool = False) -> pa.Array:
+    """Doubles as they are, NaN as null if asked."""
+    return _numbers(np.ascontiguousarray(values), pa.float64(), null=null)
+
+
+def _numbers(values: NDArray[Any], kind: pa.DataType, *, null: bool) -> pa.Array:
+    missing = np.isnan(values) if null else np.zeros(0, np.bool_)
+    valid = pa.py_buffer(np.packbits(~missing, bitorder="little")) if missing.any() else None
+    return pa.Array.from_buffers(kind, len(values), [valid, pa.py_buffer(values)])
