@@ -81,6 +81,18 @@ CASES: tuple[Case, ...] = (
 
 GROUPS = (1, 2, 3, 4)
 
+INPUTS: Mapping[str, str] = {"law_limit": "paper", "motor_limit": "paper_motor_limit"}
+"""Sets of what the paper does not publish (E5, E11): name -> folder of the packaged scenarios. A limit on the law's
+acceleration, or on the motors' force."""
+
+
+def under(inputs: str, scenario: str) -> str:
+    """The scenario of a set of INPUTS that repeats the same case as one of "paper/"."""
+    case = scenario.removeprefix("paper/")
+    # What is printed is printed, whatever one thinks of the rest.
+    return scenario if case == "as_printed" else f"{INPUTS[inputs]}/{case}"
+
+
 GRADIENTS: Mapping[str, float] = {"variable_power_log": 0.56, "double_power": 3.11, "power": 3.11}
 """Slopes of the reaching laws near the origin that the paper prints with Figure 4."""
 

@@ -59,6 +59,7 @@ def reproduce(
     folder: Path,
     groups: Sequence[int] | None = None,
     *,
+    inputs: str = "law_limit",
     overrides: Mapping[str, object] | None = None,
     force: bool = False,
     progress: Progress | None = None,
@@ -67,6 +68,7 @@ def reproduce(
 
     groups    groups of Table 2, None for the whole paper. Some groups alone give their rows of Table 4, their figures
               and the claims that they can test
+    inputs    a set of what the paper does not publish: "law_limit" (paper/), "motor_limit" (paper_motor_limit/)
     overrides  values by dotted key that take the place of the scenarios' own
     force     replace a reproduction that has more than this one or was made with other overrides, and files that were
               edited since; write beside what others have put there
@@ -79,9 +81,13 @@ def reproduce(
     wanted = GROUPS if groups is None else groups
     changes_made = dict(overrides or {})
     # Seen now, not when all is computed.
-    _refuse_loss(folder, {"groups": sorted(set(wanted)), "whole": whole, "set": changes_made}, force=force)
+    _refuse_loss(
+        folder, {"groups": sorted(set(wanted)), "whole": whole, "set": changes_made, "inputs": inputs}, force=force
+    )
     report = progress or (lambda share: None)
-    done = study(wanted, whole=whole, changes=changes_made, progress=lambda share: report(_SIMULATED * share))
+    done = study(
+        wanted, whole=whole, changes=changes_made, inputs=inputs, progress=lambda share: report(_SIMULATED * share)
+    )
     findings = judge(CLAIMS, done.evidence, done.halved)
     files: dict[str, bytes] = {}
     svg: dict[str, bytes] = {}
@@ -96,7 +102,7 @@ def reproduce(
     files["report.md"] = to_markdown(document).encode()
     files[REPORT] = to_html(document).encode()
     files["numbers.json"] = canonical_json({"table_4": table, "claims": [_plain_finding(f) for f in findings]})
-    described = {"kind": _KIND, "groups": list(done.groups), "whole": whole, "set": changes_made}
+    described = {"kind": _KIND, "groups": list(done.groups), "whole": whole, "set": changes_made, "inputs": inputs}
     changes = write_tree(folder, files, described, force=force)
     return Reproduction(folder, tuple(findings), tuple(table), changes)
 
@@ -117,6 +123,8 @@ def _refuse_loss(folder: Path, wanted: Mapping[str, Any], *, force: bool) -> Non
     reason = ""
     if earlier.get("set", {}) != json.loads(canonical_json(wanted["set"])):
         reason = "lists a reproduction with other values of --set"
+    elif earlier.get("inputs", "law_limit") != wanted["inputs"]:
+        reason = "lists a reproduction with other --inputs"
     elif earlier.get("whole") and not wanted["whole"]:
         reason = "lists a reproduction of the whole paper, and a group alone is less than that"
     elif lost:

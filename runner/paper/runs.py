@@ -19,7 +19,7 @@ from springline.model.structure import Structure
 from springline.model.theory import felt_acceleration
 from springline.runner.analysis import proof_of, reaching_law, signals_along
 from springline.runner.files import InputError, Problem
-from springline.runner.paper.cases import LAWS, cases
+from springline.runner.paper.cases import INPUTS, LAWS, cases, under
 from springline.runner.paper.evidence import Evidence, Inherent
 from springline.runner.paper.measured import Floats, Measured
 from springline.runner.paper.numbers import exact
@@ -117,18 +117,22 @@ class Study:
 
     groups     groups of Table 2 that were run
     changes    overrides of all scenarios, by dotted key
+    inputs     the set of INPUTS whose scenarios these are, named as in "paper/"
     whole      whether the rest was run too: Figures 4 to 7 and the sections on what the paper leaves open
     scenarios  scenario name -> scenario of each case
     evidence, halved  what the claims look at, with the scenarios' step and with half of it
     literal, readings, layers, limits, sampling, solver  the experiments of these names; empty unless `whole`
+    beside     other set of INPUTS -> scenario name -> group 2 under that; empty unless `whole`
     """
 
     groups: tuple[int, ...]
     changes: Overrides
+    inputs: str
     whole: bool
     scenarios: Mapping[str, Scenario]
     evidence: Evidence
     halved: Evidence
+    beside: Mapping[str, Mapping[str, Measured]]
     literal: Mapping[str, Twice]
     readings: Mapping[str, Twice]
     layers: Mapping[str, Twice]
@@ -138,10 +142,16 @@ class Study:
 
 
 def study(
-    groups: Sequence[int], *, whole: bool, changes: Overrides | None = None, progress: Progress | None = None
+    groups: Sequence[int],
+    *,
+    whole: bool,
+    changes: Overrides | None = None,
+    inputs: str = "law_limit",
+    progress: Progress | None = None,
 ) -> Study:
     """Run everything that a reproduction of these groups needs.
 
+    inputs    one of INPUTS, the set of what the paper does not publish
     changes   overrides of all scenarios; where an experiment varies the same key, the experiment's counts
     progress  called now and then with the share that is done (0 .. 1)
     Raises InputError for overrides that a scenario refuses or that the report has no analysis for, ValueError for a
@@ -156,21 +166,28 @@ def study(
         for number, table in enumerate(tables)
         for key, experiment in table.items()
     }
+    others = [other for other in INPUTS if whole and other != inputs]
     scenarios = {
-        (*key, half): _scenario(name, {**changed, **overrides}, half)
+        (*key, half): _scenario(under(inputs, name), {**changed, **overrides}, half)
         for key, (name, overrides) in wanted.items()
         for half in (False, True)
     }
     linear = (
         {
-            (law, half): _scenario("paper/nominal", {**changed, "control.law": law}, half)
+            (law, half): _scenario(under(inputs, "paper/nominal"), {**changed, "control.law": law}, half)
             for law in LAWS
             for half in (False, True)
         }
         if whole
         else {}
     )
-    runs = _run_all({**scenarios, **{("linear", *key): scenario for key, scenario in linear.items()}}, progress)
+    beside = {
+        ("beside", other, case.scenario): _scenario(under(other, case.scenario), changed, half=False)
+        for other in others
+        for case in cases([2])
+    }
+    straight = {("linear", *key): scenario for key, scenario in linear.items()}
+    runs = _run_all({**scenarios, **straight, **beside}, progress)
 
     mechanical = {key: value for key, value in changed.items() if not key.startswith("base_motion")}
 
@@ -183,8 +200,11 @@ def study(
                 for name, run in measured.items()
                 if run.status == "ok"
             },
-            laws={law: reaching_law(load_scenario("paper/nominal", {**changed, "control.law": law})) for law in LAWS},
-            inherent=inherent_of(load_scenario("paper/group1_shake", mechanical)),
+            laws={
+                law: reaching_law(load_scenario(under(inputs, "paper/nominal"), {**changed, "control.law": law}))
+                for law in LAWS
+            },
+            inherent=inherent_of(load_scenario(under(inputs, "paper/group1_shake"), mechanical)),
             linear={law: runs["linear", law, half] for law in LAWS} if whole else {},
         )
 
@@ -194,10 +214,12 @@ def study(
     return Study(
         tuple(sorted(set(groups))),
         changed,
+        inputs,
         whole,
         {name: scenarios["case", name, False] for name in names},
         evidence(False),
         evidence(True),
+        {other: {case.scenario: runs["beside", other, case.scenario] for case in cases([2])} for other in others},
         *(experiments(number, table) for number, table in enumerate(_TABLES)),
     )
 

@@ -5,7 +5,6 @@ from .document import Document as Document
 from .document import Equation as Equation
 from .document import Heading as Heading
 from .document import Picture as Picture
-from .document import Source as Source
 from .document import Table as Table
 from .document import Text as Text
 from .document import to_html as to_html

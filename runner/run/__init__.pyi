@@ -10,7 +10,6 @@ from .figures import run_figures as run_figures
 from .limits import refuse_large as refuse_large
 from .limits import refuse_rows as refuse_rows
 from .limits import row_size as row_size
-from .report import REPORT as REPORT
 from .report import report_files as report_files
 from .settings import kernel_structure as kernel_structure
 from .settings import loop_settings as loop_settings

@@ -32,7 +32,7 @@ from springline.runner.report import (
     symbol,
 )
 from springline.runner.run.columns import values
-from springline.runner.run.simulation import Result
+from springline.runner.run.simulated import Simulated
 from springline.runner.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -61,7 +61,7 @@ class Drawn:
     caption: str
 
 
-def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
+def run_figures(scenario: Scenario, result: Simulated) -> dict[str, Figure]:
     """The overview of one run, by name: tracking, error, force; sliding and phase_plane if there is a sliding variable,
     springs if there are springs, base_motion if the base moves, disturbance of the links on which forces act, measured
     if sensors show something else than the state, controller_states if there are some, tip if the arm has one. If the
@@ -70,7 +70,7 @@ def run_figures(scenario: Scenario, result: Result) -> dict[str, Figure]:
     return {name: drawn.figure for name, drawn in drawn_figures(scenario, result).items()}
 
 
-def drawn_figures(scenario: Scenario, result: Result) -> dict[str, Drawn]:
+def drawn_figures(scenario: Scenario, result: Simulated) -> dict[str, Drawn]:
     """The figures of `run_figures` with their captions."""
     run = _Run(scenario, result)
     figures: dict[str, Callable[[_Run], Drawn]] = {"tracking": _tracking, "error": _error}
@@ -108,7 +108,7 @@ class _Part:
 class _Run:
     """A run as the figures want it: columns as arrays, with their units."""
 
-    def __init__(self, scenario: Scenario, result: Result) -> None:
+    def __init__(self, scenario: Scenario, result: Simulated) -> None:
         self.scenario = scenario
         self.joints: tuple[Joint, ...] = scenario.system().joints
         self.bands = (

@@ -31,7 +31,7 @@ from springline.runner.report import (
     to_html,
 )
 from springline.runner.run.columns import values
-from springline.runner.run.simulation import Result
+from springline.runner.run.simulated import Simulated
 from springline.runner.run.trajectory_hash import trajectory_hash
 from springline.runner.scenario import Scenario
 from springline.runner.version import __version__
@@ -54,7 +54,7 @@ class Verdict:
     text: str
 
 
-def verdicts(scenario: Scenario, result: Result) -> list[Verdict]:
+def verdicts(scenario: Scenario, result: Simulated) -> list[Verdict]:
     """How the run ended, whether each joint settled, whether commands chatter, which limits were reached, how far the
     springs gave.
     """
@@ -70,7 +70,7 @@ def verdicts(scenario: Scenario, result: Result) -> list[Verdict]:
 
 
 def report_files(
-    scenario: Scenario, result: Result, *, plot: bool = True, progress: Callable[[float], None] | None = None
+    scenario: Scenario, result: Simulated, *, plot: bool = True, progress: Callable[[float], None] | None = None
 ) -> dict[str, bytes]:
     """report.html and figures/ of a run, by path. The same run gives the same bytes.
 
@@ -95,7 +95,7 @@ def report_files(
     return files
 
 
-def _document(scenario: Scenario, result: Result, pictures: Sequence[Picture]) -> Document:
+def _document(scenario: Scenario, result: Simulated, pictures: Sequence[Picture]) -> Document:
     words = [(v.what, f"[[{v.word}]]" if v.word else "", v.text) for v in verdicts(scenario, result)]
     blocks: list[Block] = [
         Heading("What was run"),
@@ -119,7 +119,7 @@ def _document(scenario: Scenario, result: Result, pictures: Sequence[Picture]) -
 class _Numbers:
     """A run's columns and metrics."""
 
-    def __init__(self, scenario: Scenario, result: Result) -> None:
+    def __init__(self, scenario: Scenario, result: Simulated) -> None:
         self.scenario, self.result = scenario, result
         self.joints = scenario.system().joints
         self.end = float(result.trajectory["t"][-1].as_py())
@@ -140,7 +140,7 @@ def _end(run: _Numbers) -> Verdict:
     return Verdict("the run", status.replace("_", " "), text)
 
 
-def _outcome(result: Result) -> str:
+def _outcome(result: Simulated) -> str:
     """How a run ended, as a sentence."""
     said = result.message if result.status == "ok" else f"stopped: {result.message.partition(': ')[2]}"
     return f"{said[0].upper()}{said[1:]}.".replace("<=", "≤")
@@ -234,7 +234,7 @@ def _spring(run: _Numbers, joint: Joint) -> Verdict:
     return Verdict(f"{joint.name}: spring", "", f"It gives {size} at most, at {when}.")
 
 
-def _metrics(scenario: Scenario, result: Result) -> Table:
+def _metrics(scenario: Scenario, result: Simulated) -> Table:
     """The metrics, a row each and a column a joint."""
     joints, unit = scenario.system().joints, units(result.metrics)
     found: Mapping[str, Any] = result.metrics.to_pylist()[0]

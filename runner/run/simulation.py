@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from springline.codegen.kernel import (
@@ -32,6 +31,7 @@ from springline.runner.run.crew import Crew, results
 from springline.runner.run.limits import refuse_large
 from springline.runner.run.settings import kernel_structure, loop_settings
 from springline.runner.run.shown import figure_of, line_of, page_of
+from springline.runner.run.simulated import Simulated
 from springline.runner.scenario import Scenario, expect_scenario, kernel_tables
 
 if TYPE_CHECKING:
@@ -42,21 +42,12 @@ Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Result:
-    """What a run gave.
+class Result(Simulated):
+    """What a run gave, and what was simulated.
 
-    trajectory  columns as System.trajectory has them: t, the state, q1d_, e_, sigma_, U_ per joint, the base
-    metrics     one row, columns as System.metrics has them; null where there is none
-    status      "ok", "diverged", "out_of_bounds" or "out_of_limits"
-    message     one sentence: for a run that stopped, the quantity and the time at which it left its bound; for one that
-                chatters, how much
-    scenario    what was simulated
+    scenario  what was simulated
     """
 
-    trajectory: pa.Table
-    metrics: pa.Table
-    status: str
-    message: str
     scenario: Scenario
 
     def __repr__(self) -> str:
@@ -65,7 +56,7 @@ class Result:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: message, metrics and a figure."""
-        return page_of(self)
+        return page_of(self.scenario, self)
 
     def plot(self, name: str = "tracking") -> Figure:
         """One figure of the run, as `springline run` draws it.
@@ -74,7 +65,7 @@ class Result:
               "measured", "controller_states", "tip" where there is such a thing
         Raises ValueError, with the names that there are, for any other.
         """
-        return figure_of(self, name)
+        return figure_of(self.scenario, self, name)
 
     def to_pandas(self) -> Any:
         """The trajectory as a pandas.DataFrame, the units in its ``attrs["units"]``; see `to_pandas` for any table."""

@@ -20,6 +20,14 @@ def reproduce(
         list[int] | None,
         typer.Option("--group", metavar="N", help="A group of Table 2 alone. May be given again.", show_default="all"),
     ] = None,
+    inputs: Annotated[
+        str,
+        typer.Option(
+            "--inputs",
+            metavar="NAME",
+            help="What the paper does not publish: law_limit or motor_limit, where it limits.",
+        ),
+    ] = "law_limit",
     changes: Changes = None,
     no_code: NoCode = False,
     force: Annotated[
@@ -33,18 +41,20 @@ def reproduce(
 
     Example: springline reproduce --group 1 -o reproduction
     """
-    from springline.runner.paper import GROUPS
+    from springline.runner.paper import GROUPS, INPUTS
     from springline.runner.paper import reproduce as repeat
 
     known = [str(item) for item in GROUPS]
     wrong = [str(item) for item in group or [] if str(item) not in known]
     if wrong:
         raise InputError(*(unknown("springline reproduce", "--group", "group", item, known) for item in wrong))
+    if inputs not in INPUTS:
+        raise InputError(unknown("springline reproduce", "--inputs", "set of inputs", inputs, list(INPUTS)))
     expect_folder(output)
     refuse_results(output)
     changed = overrides(changes, "the paper's scenarios")
     with progress("reproducing the paper", quiet=as_json) as report:
-        done = repeat(output, group, overrides=changed, force=force, progress=report)
+        done = repeat(output, group, inputs=inputs, overrides=changed, force=force, progress=report)
     if as_json:
         print_json("reproduce", done.table, {})
         return

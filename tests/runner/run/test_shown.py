@@ -33,7 +33,7 @@ def test_a_notebook_shows_metrics_with_units_and_a_figure(result: Any) -> None:
 def test_figures_by_name(result: Any) -> None:
     assert isinstance(result.plot(), Figure)
     assert isinstance(result.plot("springs"), Figure)
-    with pytest.raises(ValueError, match="there is no figure 'tip_'.*expected one of tracking, error"):
+    with pytest.raises(ValueError, match=r"there is no figure 'tip_', expected one of tracking, error"):
         result.plot("tip_")
 
 
