@@ -319,3 +319,23 @@ def test_firmware(tmp_path: Path, require_tool: Callable[..., str]) -> None:
     assert stack < 512
     assert flash < 16 * 1024
     assert data == 0
+
+
+def test_a_search_that_is_begun_again_goes_on_where_it_was(tmp_path: Path) -> None:
+    """Small ones, of the same seed: whole, and cut off after its first generation."""
+
+    def search(folder: Path) -> str:
+        command = [sys.executable, str(EXAMPLES / "identify_table4.py"), "--generations", "2", "--population", "6"]
+        return run(*command, "--seeds", "1", "--state", str(folder))
+
+    whole = search(tmp_path / "whole")
+    assert re.search(r"^seed 1: cost [\d.]+, \d+ of 24 within 30 %$", whole, re.MULTILINE)
+    state = json.loads((tmp_path / "whole" / "seed1.json").read_text())
+    assert len(state) == 3
+    (tmp_path / "cut").mkdir()
+    (tmp_path / "cut" / "seed1.json").write_text(json.dumps(state[:1]))
+    again = search(tmp_path / "cut")
+    assert "generation 0:" not in again
+    assert "generation 1:" in again
+    assert again.partition("seed 1: cost")[2] == whole.partition("seed 1: cost")[2] != ""
+    assert json.loads((tmp_path / "cut" / "seed1.json").read_text()) == state
