@@ -139,7 +139,15 @@ def test_wheel_metadata(dist: Path, wheel: set[str]) -> None:
     required = {re.split(r"[^\w-]", line)[0] for line in metadata.get_all("Requires-Dist", ())}
     needed = {"casadi", "jinja2", "lazy_loader", "matplotlib", "numpy", "pyarrow", "pydantic", "scipy", "typer"}
     assert needed <= required
-    assert set(metadata.get_all("Provides-Extra", ())) == {"bench", "compiler", "dev", "distributed", "fmu", "verify"}
+    assert set(metadata.get_all("Provides-Extra", ())) == {
+        "bench",
+        "compiler",
+        "dev",
+        "distributed",
+        "docs",
+        "fmu",
+        "verify",
+    }
 
 
 def test_sdist_can_be_built_and_tested_from(sdist: set[str]) -> None:
