@@ -512,7 +512,7 @@ def _margins(work: _Work) -> list[Row]:
 
 
 def _enough(work: _Work, slim: bool) -> bool | None:
-    """Whether what is stable is so by enough; None where smaller oscillations meet a gain without bound, so are not judged."""
+    """Whether what is stable is so by enough; None where smaller oscillations meet a gain without bound."""
     return None if work.unbounded else not slim
 
 
@@ -591,7 +591,9 @@ def _floquet(work: _Work) -> list[Row]:
         return [Row("floquet_exponent", None, "1/s", None, found.reason)]
     stable = bool(found.value < 0)
     verdict = (
-        "disturbances of the periodic motion die out" if stable else "unstable: disturbances of the periodic motion grow"
+        "disturbances of the periodic motion die out"
+        if stable
+        else "unstable: disturbances of the periodic motion grow"
     )
     text = f"{verdict}, {found.value:.3g} 1/s; {found.reason}{_margin_holds(work)}"
     return [Row("floquet_exponent", found.value, "1/s", _enough(work, slim=False) if stable else False, text)]
