@@ -18,7 +18,7 @@ from springline.runner.analysis.crossings import Margins, delay_max, margins
 from springline.runner.analysis.floquet import floquet_exponent
 from springline.runner.analysis.limit_cycle import LimitCycle, limit_cycle
 from springline.runner.analysis.limits import limits_from
-from springline.runner.analysis.loop import Boundary, LinearLoop, linear_loop
+from springline.runner.analysis.loop import Boundary, LinearLoop, linear_loop, linearised
 from springline.runner.analysis.modes import TimeScales, fast_gain, time_scales
 from springline.runner.analysis.proof import Proof, proof_of, proof_reaches
 from springline.runner.analysis.reaching import AMPLITUDES
@@ -38,7 +38,7 @@ SEPARATED = 0.1
 """Slow bandwidth over slowest fast mode up to which the slow and the fast part may be designed apart."""
 
 SLIM_GAIN, SLIM_PHASE = 2.0, math.radians(30.0)
-"""Margins below which a stable loop is called so only just: 6 dB and 30 degrees."""
+"""Margins below which a verdict fails: 6 dB and 30 degrees."""
 
 _SMALL = 1e-6  # amplitude of sigma, where limit cycles begin
 _MOST_RANGES = 6
@@ -335,7 +335,7 @@ def _time_limit(
     boundary = finder(work.loop)[0]
     work.at[name] = boundary.at
     if work.unbounded and boundary.value is not None:
-        text = f"no finite boundary: {work.unbounded}; however fast it is, it ends in a limit cycle"
+        text = f"no finite boundary: {work.unbounded}; however small it is, the loop ends in a limit cycle"
         return [Row(name, None, "s", False if work.unstable else None, text + _cycle_text(work))]
     if boundary.value is None:
         text = boundary.reason if not work.unstable else f"{_unstable(work)}; {boundary.reason}"
@@ -458,7 +458,12 @@ def _k1(work: _Work) -> list[Row]:
     margins = k1 - largest
     k = int(np.argmin(margins))
     bounds = proof.bounds
-    if margins[k] > 0:
+    if work.unstable and margins[k] <= 0:
+        verdict = (
+            f"the disturbance met, {largest[k]:.3g} ({work.joints[k].name}), is that of an unstable loop's own "
+            f"oscillation and no measure of k1 = {k1:g}: make the loop stable first"
+        )
+    elif margins[k] > 0:
         verdict = f"k1 = {k1:g} exceeds the disturbance met, {largest[k]:.3g} ({work.joints[k].name}), along the run"
     else:
         verdict = (
@@ -469,7 +474,9 @@ def _k1(work: _Work) -> list[Row]:
         f"{joint.name} {bound:.3g} s" if math.isfinite(bound) else f"{joint.name} none"
         for joint, bound in zip(work.joints, bounds.total, strict=True)
     )
-    rows = [Row("k1_margin", float(margins[k]), unit, bool(margins[k] > 0), f"{verdict}; bounds on settling: {total}")]
+    # A bound takes the base's share of d alone: beside a margin below zero it would promise what does not hold.
+    settling = f"; bounds on settling: {total}" if margins[k] > 0 else ""
+    rows = [Row("k1_margin", float(margins[k]), unit, bool(margins[k] > 0), verdict + settling)]
     for i, joint in enumerate(work.joints):
         size = f"sigma stays within {proof.residual[i]:.3g} {joint.unit}/s (in the run: {proof.remaining[i]:.3g})"
         if not math.isfinite(proof.residual[i]):
@@ -504,27 +511,43 @@ def _margins(work: _Work) -> list[Row]:
     return rows
 
 
+def _enough(work: _Work, slim: bool) -> bool | None:
+    """Whether what is stable is so by enough; None where smaller oscillations meet a gain without bound."""
+    return None if work.unbounded else not slim
+
+
+def _margin_holds(work: _Work) -> str:
+    """The amplitude that a margin is for, where there is one."""
+    if not work.gained:
+        return ""
+    smaller = ", smaller ones meet more gain" if work.unbounded else ""
+    return f" (at sigma amplitude {work.amplitude:g}{smaller})"
+
+
 def _gain_words(work: _Work, found: Margins, i: int, values: Floats) -> tuple[float | None, str, bool | None, str]:
     joint, value = work.joints[i].name, float(values[i])
     if not math.isfinite(value) or value <= 0:
         return None, "1", True, f"no gain of the {joint} motor's channel makes the loop unstable"
     slim = max(value, 1 / value) < SLIM_GAIN
-    how = "slim, " if slim else ""
-    side = "grow" if value > 1 else "fall"
-    at = f" at {found.gain_frequency[i]:.4g} rad/s" if math.isfinite(found.gain_frequency[i]) else ""
-    text = f"{how}stable until the {joint} motor's channel has {value:.3g} times its gain (it may {side} by that){at}"
-    return value, "1", True, text
+    how = f"slim, below a factor of {SLIM_GAIN:g} (6 dB): " if slim else ""
+    side = "rises" if value > 1 else "falls"
+    at = f", at {found.gain_frequency[i]:.4g} rad/s" if math.isfinite(found.gain_frequency[i]) else ""
+    text = f"{how}stable until the gain of the {joint} motor's channel {side} to {value:.3g} times its own{at}"
+    return value, "1", _enough(work, slim), text + _margin_holds(work)
 
 
 def _phase_words(work: _Work, found: Margins, i: int, values: Floats) -> tuple[float | None, str, bool | None, str]:
     joint, value = work.joints[i].name, float(values[i])
     if not math.isfinite(value):
         return None, "rad", True, f"the {joint} motor's channel has a gain below 1 at every frequency"
-    how = "slim, " if value < SLIM_PHASE else ""
-    frequency = float(found.phase_frequency[i])
-    at = f" at {frequency:.4g} rad/s (no measure of delay: that is delay_max)" if frequency > 0 else ""
-    text = f"{how}stable until the {joint} motor's channel lags {math.degrees(value):.3g} degrees more{at}"
-    return value, "rad", True, text
+    slim = value < SLIM_PHASE
+    how = f"slim, below {math.degrees(SLIM_PHASE):.0f} degrees: " if slim else ""
+    at = f" at {found.phase_frequency[i]:.4g} rad/s" if found.phase_frequency[i] > 0 else ""
+    text = f"{how}stable until the phase of the {joint} motor's channel turns by {math.degrees(value):.3g} degrees{at}"
+    delay, frequency = float(found.delay[i]), float(found.delay_frequency[i])
+    if math.isfinite(delay):
+        text += f"; a delay of this channel alone may be {delay:.3g} s, by its crossover at {frequency:.4g} rad/s"
+    return value, "rad", _enough(work, slim), text + _margin_holds(work)
 
 
 def _cycle_text(work: _Work) -> str:
@@ -534,6 +557,14 @@ def _cycle_text(work: _Work) -> str:
     return f"; predicted: sigma {float(cycle.amplitude.max()):.3g} at {cycle.frequency:.4g} rad/s"
 
 
+def _calmer(work: _Work) -> str:
+    """What to change against a limit cycle, of what the scenario has."""
+    keys = work.scenario.numeric_keys()
+    raised = [key for key in ("control.delta", "control.K_f") if key in keys and linearised(work.scenario).reads(key)]
+    ways = ([f"raise {' or '.join(raised)}"] if raised else []) + (["sample faster"] if work.sampled else [])
+    return f". To calm it, {', or '.join(ways)}" if ways else ""
+
+
 def _cycle(work: _Work) -> list[Row]:
     cycle = work.cycle
     if cycle is None or cycle.amplitude is None or cycle.frequency is None:
@@ -541,8 +572,7 @@ def _cycle(work: _Work) -> list[Row]:
     k = int(np.argmax(cycle.amplitude))
     text = (
         f"small oscillations grow and large ones die out: a limit cycle, mostly of the {work.joints[k].name}; sigma "
-        f"swings by {cycle.amplitude[k]:.3g} at {cycle.frequency:.4g} rad/s. Raise control.delta or control.K_f, or "
-        "sample faster"
+        f"swings by {cycle.amplitude[k]:.3g} at {cycle.frequency:.4g} rad/s{_calmer(work)}"
     )
     unit = " or ".join(dict.fromkeys(f"{item.unit}/s" for item in work.joints))
     rows = [
@@ -561,10 +591,12 @@ def _floquet(work: _Work) -> list[Row]:
         return [Row("floquet_exponent", None, "1/s", None, found.reason)]
     stable = bool(found.value < 0)
     verdict = (
-        "disturbances of the periodic motion die out" if stable else "unstable: they grow along the periodic motion"
+        "disturbances of the periodic motion die out"
+        if stable
+        else "unstable: disturbances of the periodic motion grow"
     )
-    text = f"{verdict}, {found.value:.3g} 1/s; {found.reason}"
-    return [Row("floquet_exponent", found.value, "1/s", stable, text)]
+    text = f"{verdict}, {found.value:.3g} 1/s; {found.reason}{_margin_holds(work)}"
+    return [Row("floquet_exponent", found.value, "1/s", _enough(work, slim=False) if stable else False, text)]
 
 
 # Runs beside the boundaries

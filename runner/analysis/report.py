@@ -41,6 +41,13 @@ Floats = NDArray[np.float64]
 
 REPORT = "report.html"
 _KIND = "analysis"
+_SHOWN = {
+    "delta_critical": "spectrum",
+    "floquet_exponent": "reference",
+    "gain_margin": "channels",
+    "phase_margin": "channels",
+}
+"""The figure that shows a verdict, and its joints' verdicts."""
 _WORDS = {True: "[[holds]]", False: "[[fails]]", None: "–"}
 
 
@@ -134,6 +141,16 @@ def _shown(value: float | None) -> str:
     return "∞" if math.isinf(value) else f"{value:.3g}".replace("-", "−")
 
 
+def _figure_of(name: str, pictures: Sequence[Block]) -> str:
+    """Where a verdict is drawn, by its figure's caption; "" where none shows it."""
+    for verdict, figure in _SHOWN.items():
+        if name == verdict or name.startswith(f"{verdict}_"):
+            for picture in pictures:
+                if isinstance(picture, Picture) and picture.path == f"figures/{figure}":
+                    return f". Figure: {picture.caption.split('**')[1].rstrip('.')}"
+    return ""
+
+
 def _document(
     found: Analysis,
     curves: Mapping[str, LawCurves],
@@ -147,7 +164,8 @@ def _document(
     verdicts = []
     for row in found.rows:
         runs = [_shown(row.confirmed)] if confirmed else []
-        verdicts.append([f"`{row.name}`", _WORDS[row.ok], _shown(row.value), *runs, row.unit, row.text])
+        text = row.text.rstrip(".") + _figure_of(row.name, pictures)
+        verdicts.append([f"`{row.name}`", _WORDS[row.ok], _shown(row.value), *runs, row.unit, text])
     blocks: list[Block] = [
         Heading("Verdicts"),
         Table(columns, verdicts, labels=len(columns)),

@@ -102,7 +102,7 @@ def sensitivities(scenario: Scenario, boundary: Callable[[dict[str, Floats]], Fl
         unit = "s" if metric == "settling_time" else worst.unit
         found.append((f"{title}, {worst.name}", unit, by_joint[worst]))
     if boundary is not None:
-        found.append(("smallest stable delta", "", boundary(columns)))
+        found.append(("smallest stable delta", scenario.numeric_keys()["control.delta"].unit, boundary(columns)))
     effects = [Effect(title, unit, float(moved[0]), moved[1::2], moved[2::2]) for title, unit, moved in found]
     known = [effect for effect in effects if not math.isnan(effect.nominal)]
     matters = [k for k in range(len(names)) if any(effect.reach[k] > 1e-9 for effect in known)]

@@ -220,3 +220,12 @@ def test_a_wide_limit_cycle_is_said_to_be_another_and_why() -> None:
     assert "a surface bends too" in row.text
     frequency = found.row("limit_cycle_frequency")
     assert frequency.confirmed == pytest.approx(frequency.value, rel=0.01)
+
+
+def test_a_slim_margin_fails_and_says_so() -> None:
+    found = analysed(control__mode="sampled", control__period=0.0018)
+    row = found.row("phase_margin")
+    assert found.status == "ok"
+    assert row.ok is False
+    assert row.text.startswith("slim, below 30 degrees")
+    assert "a delay of this channel alone may be" in row.text
