@@ -13,7 +13,7 @@ PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-bui
 SHIPPED = $(shell find springline model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format docs docs-tables docs-controllers docs-hardware docs-sweeps docs-first docs-pictures math-accuracy prove firmware bench docs-bench clean FORCE
+.PHONY: help install reproduce test test-full lint format docs docs-tables docs-controllers docs-hardware docs-sweeps docs-first docs-pictures math-accuracy prove firmware bench docs-bench dist clean FORCE
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -77,6 +77,14 @@ bench: .venv/installed ## side by side with what one would use instead
 
 docs-bench: bench ## measure, and put the results into docs/performance.md
 	$(BIN)/python -m benchmarks.docs_results
+
+# From what is committed, in a folder of its own: nothing that lies about gets in, and the time is the commit's.
+dist: .venv/installed ## sdist and wheel of the last commit in dist/, the same bytes each time, checked by twine
+	rm -rf build/release dist
+	mkdir -p build/release
+	git archive HEAD | tar -x -C build/release
+	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m build --no-isolation --outdir dist build/release
+	$(BIN)/python -m twine check --strict dist/*
 
 clean: ## remove what the other verbs made; results in OUT stay
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
