@@ -30,7 +30,7 @@ def plain(member: tarfile.TarInfo) -> tarfile.TarInfo:
 class Sdist(sdist):
     """The sdist as a tar file that is the same wherever it is made."""
 
-    def make_archive(self, base_name: str, format: str, root_dir=None, base_dir=None, owner=None, group=None) -> str:  # noqa: A002, E501
+    def make_archive(self, base_name: str, format: str, root_dir=None, base_dir=None, owner=None, group=None) -> str:  # noqa: A002
         """Pack the folder `base_dir`; another format than gztar is packed as setuptools does."""
         if format != "gztar":
             return super().make_archive(base_name, format, root_dir, base_dir, owner, group)
