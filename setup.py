@@ -31,6 +31,7 @@ class Sdist(sdist):
     """The sdist as a tar file that is the same wherever it is made."""
 
     def make_archive(self, base_name: str, format: str, root_dir=None, base_dir=None, owner=None, group=None) -> str:  # noqa: A002
+        """Pack the folder `base_dir`; another format than gztar is packed as setuptools does."""
         if format != "gztar":
             return super().make_archive(base_name, format, root_dir, base_dir, owner, group)
         name = f"{base_name}.tar.gz"
@@ -48,6 +49,7 @@ class Wheel(bdist_wheel):
     """The wheel with the modes that an installation needs, whatever the umask."""
 
     def run(self) -> None:
+        """Build it."""
         before = os.umask(0o022)
         try:
             super().run()

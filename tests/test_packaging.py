@@ -3,19 +3,25 @@
 import configparser
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
+import venv
 import zipfile
 from collections.abc import Callable
 from email.parser import Parser
+from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
+VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+EXTRAS = {"bench", "compiler", "dev", "distributed", "docs", "fmu", "verify"}
 PACKAGES = ("benchmarks", "codegen", "generated", "model", "runner")
 FACE = {"__init__.py", "__init__.pyi", "py.typed"}
 CARRIED = (*PACKAGES, "docs", "examples", "springline", "tests")
@@ -33,28 +39,36 @@ def tree(*folders: str, suffixes: tuple[str, ...] = ()) -> set[str]:
     }
 
 
-def run(*command: str, cwd: Path) -> str:
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+def run(*command: str, cwd: Path, **more: str) -> str:
+    """What a command says, with `more` in its environment."""
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, env=os.environ | more)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
     return done.stdout
 
 
+def built(source: Path, out: Path, umask: int) -> None:
+    """Sdist, and the wheel from it, of a copy of the tree in `source`.
+
+    From a copy: setuptools leaves build/ and *.egg-info behind, which the next wheel would pick up.
+    """
+    source.mkdir(exist_ok=True)
+    for folder in CARRIED:
+        shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    for file in ROOT.iterdir():
+        if file.is_file():
+            shutil.copyfile(file, source / file.name)
+    environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"}
+    build = [*PYTHON, "-m", "build", "--no-isolation", "--outdir", str(out)]
+    done = subprocess.run(build, cwd=source, capture_output=True, text=True, check=False, env=environment, umask=umask)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
+
+
 @pytest.fixture(scope="module")
 def dist(once: Once, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder with the sdist, and the wheel built from that sdist.
-
-    Built from a copy: setuptools leaves build/ and *.egg-info behind, which the next wheel would pick up.
-    """
+    """The folder with the sdist, and the wheel built from that sdist."""
 
     def make(out: Path) -> None:
-        source = tmp_path_factory.mktemp("source")
-        for folder in CARRIED:
-            if (ROOT / folder).exists():
-                shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
-        for file in ROOT.iterdir():
-            if file.is_file():
-                shutil.copy(file, source)
-        run(*PYTHON, "-m", "build", "--no-isolation", "--outdir", str(out), cwd=source)
+        built(tmp_path_factory.mktemp("source"), out, 0o022)
 
     return once("dist", make)
 
@@ -139,21 +153,63 @@ def test_wheel_metadata(dist: Path, wheel: set[str]) -> None:
     required = {re.split(r"[^\w-]", line)[0] for line in metadata.get_all("Requires-Dist", ())}
     needed = {"casadi", "jinja2", "lazy_loader", "matplotlib", "numpy", "pyarrow", "pydantic", "scipy", "typer"}
     assert needed <= required
-    assert set(metadata.get_all("Provides-Extra", ())) == {
-        "bench",
-        "compiler",
-        "dev",
-        "distributed",
-        "docs",
-        "fmu",
-        "verify",
-    }
+    assert set(metadata.get_all("Provides-Extra", ())) == EXTRAS
 
 
 def test_sdist_can_be_built_and_tested_from(sdist: set[str]) -> None:
-    assert tree(*CARRIED) <= sdist
-    assert {"CHANGELOG.md", "LICENSE", "Makefile", "README.md", "pyproject.toml", "setup.py"} <= sdist
-    assert not {name for name in sdist if name.endswith((".pyc", ".so"))}
+    """All of the project and nothing else; what setuptools adds is named."""
+    top = {"CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "MANIFEST.in", "Makefile", "README.md"}
+    added = {"PKG-INFO", "setup.cfg"} | {name for name in sdist if name.startswith("springline.egg-info/")}
+    assert sdist - added == tree(*CARRIED) | top | {"pyproject.toml", "setup.py"}
+
+
+def test_archives_carry_nothing_by_accident(dist: Path) -> None:
+    """No trace of who built them and where, no cache, no build, nothing but files that a user is meant to have."""
+    (sdist,), (wheel,) = dist.glob("*.tar.gz"), dist.glob("*.whl")
+    with tarfile.open(sdist) as archive:
+        members = archive.getmembers()
+        sources = {member.name: archive.extractfile(member).read() for member in members if member.isfile()}  # type: ignore[union-attr]
+    with zipfile.ZipFile(wheel) as archive:
+        shipped = {name: archive.read(name) for name in archive.namelist()}
+        modes = {entry.external_attr >> 16 & 0o777 for entry in archive.infolist()}
+    assert all(member.isfile() or member.isdir() for member in members)
+    assert {(member.uid, member.gid, member.uname, member.gname) for member in members} == {(0, 0, "", "")}
+    assert {member.mode for member in members} <= {0o644, 0o755} and modes <= {0o644, 0o664, 0o755}
+    unwanted = re.compile(
+        r"(^|/)(\.[^/]+|__pycache__|build|dist|results|reproduction)(/|$)|\.(py[cod]|so|o|whl|log|orig)$|~$"
+    )
+    assert not [name for name in (*sources, *shipped) if unwanted.search(name)]
+    assert not [name for name in shipped if re.search(r"(^|/)(tests/|test_[^/]*\.py$|conftest)", name)]
+    places = {os.fspath(ROOT), os.fspath(Path.home()), os.fspath(dist), platform.node()} - {
+        "/",
+        "/root",
+        "localhost",
+        "",
+    }
+    here = [place.encode() for place in places if len(place) > 4]
+    assert here
+    assert not [name for name, data in (sources | shipped).items() if any(place in data for place in here)]
+
+
+def test_archives_are_the_same_bytes_each_time(dist: Path, tmp_path: Path) -> None:
+    """From another folder, with files of other times, and under another umask."""
+    built(tmp_path / "elsewhere", tmp_path / "again", 0o077)
+    again = {path.name: path.read_bytes() for path in (tmp_path / "again").iterdir()}
+    assert again == {path.name: path.read_bytes() for path in dist.iterdir()}
+
+
+def test_archives_pass_the_index_check(dist: Path) -> None:
+    said = run(*PYTHON, "-m", "twine", "check", "--strict", *map(str, sorted(dist.iterdir())), cwd=dist, NO_COLOR="1")
+    assert said.count("PASSED") == 2
+
+
+def test_citation_says_what_the_project_says() -> None:
+    """Version, licence and the paper's identifier; its schema is checked by cffconvert where one changes the file."""
+    said = (ROOT / "CITATION.cff").read_text()
+    assert f"\nversion: {VERSION}\n" in said and "\nlicense: MIT\n" in said
+    (doi,) = re.findall(r"doi: (\S+)", said)
+    assert f"doi {doi}" in (ROOT / "docs/paper.md").read_text()
+    assert f"\n## {VERSION}\n" in (ROOT / "CHANGELOG.md").read_text()
 
 
 def test_installed_package_finds_its_data(installed: Path, tmp_path: Path) -> None:
@@ -183,9 +239,55 @@ def test_installed_command(installed: Path, tmp_path: Path) -> None:
     assert script.exists()
     call = f"import sys; sys.path.insert(0, {os.fspath(installed)!r}); from springline.runner.cli import main"
     version = run(*PYTHON, "-c", f"{call}; sys.argv[1:] = ['--version']; main()", cwd=tmp_path)
-    assert "0.1.0" in version
+    assert version == f"springline {VERSION}\n"
     face = "import springline as sl; print(sl.__version__, sl.batch)"
     place = f"import sys; sys.path.insert(0, {os.fspath(installed)!r}); "
-    assert run(*PYTHON, "-c", place + face, cwd=tmp_path).startswith("0.1.0 <function batch")
+    assert run(*PYTHON, "-c", place + face, cwd=tmp_path).startswith(f"{VERSION} <function batch")
     listing = f"{call}; sys.argv[1:] = ['list', 'scenarios', '--json']; main()"
     assert "paper/nominal" in run(*PYTHON, "-c", listing, cwd=tmp_path)
+
+
+class Links(HTMLParser):
+    """Where a page leads, what it loads and which places in it can be led to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.targets: list[str] = []
+        self.anchors: set[str] = set()
+        self.images = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.images += tag in ("img", "svg")
+        for name, value in attrs:
+            if name == "id":
+                self.anchors.add(value or "")
+            elif name in ("href", "src", "xlink:href"):
+                self.targets.append(value or "")
+
+
+@pytest.mark.full
+def test_a_strangers_way(dist: Path, tmp_path: Path) -> None:
+    """The wheel in a fresh environment, dependencies from the index, first files, runs: no warning, whole reports."""
+    venv.create(tmp_path / "fresh", with_pip=True)
+    place = tmp_path / "fresh/bin"
+    (wheel,) = dist.glob("*.whl")
+    run(str(place / "python"), "-m", "pip", "install", "--quiet", str(wheel), cwd=tmp_path)
+    for command in (
+        ["doctor"],
+        ["run", "paper/nominal", "-o", "nominal"],
+        ["init", "-o", "mine"],
+        ["run", "mine/scenario.toml", "-o", "first"],
+    ):
+        strict = [str(place / "python"), "-I", "-W", "error", str(place / "springline"), *command]
+        done = subprocess.run(strict, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
+    for folder in ("nominal", "first"):
+        page = Links()
+        page.feed((tmp_path / folder / "report.html").read_text())
+        assert page.images > 3
+        for target in page.targets:
+            if target.startswith("#"):
+                assert target[1:] in page.anchors, target
+            elif not target.startswith("data:"):
+                assert not re.match(r"(\w+:)?//", target), target
+                assert (tmp_path / folder / target).is_file(), target
