@@ -13,7 +13,7 @@ PIP    := PYTHONWARNINGS=ignore $(BIN)/pip install --quiet --no-compile --no-bui
 SHIPPED = $(shell find springline model codegen runner generated benchmarks -type f -not -name '*.pyc' | LC_ALL=C sort)
 
 .DEFAULT_GOAL := help
-.PHONY: help install reproduce test test-full lint format docs docs-tables docs-controllers docs-hardware docs-sweeps docs-first docs-pictures math-accuracy prove firmware bench docs-bench dist clean FORCE
+.PHONY: help install reproduce test test-full test-product lint format docs docs-tables docs-controllers docs-hardware docs-sweeps docs-first docs-pictures math-accuracy prove firmware bench docs-bench dist clean FORCE
 
 help: ## list the verbs
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -28,7 +28,10 @@ test: .venv/installed ## the tests, WORKERS=2 at a time; lists what was skipped 
 	$(BIN)/pytest -n $(WORKERS) --dist worksteal -rs
 
 test-full: .venv/installed ## the tests with those that take minutes
-	$(BIN)/pytest -n $(WORKERS) --dist worksteal -rs -m 'full or not full'
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal -rs -m 'not product'
+
+test-product: .venv/installed ## the product of all builds of a kernel, which takes hours
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal -rs -m product
 
 lint: .venv/installed ## ruff and mypy
 	$(BIN)/ruff check

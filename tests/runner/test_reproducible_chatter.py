@@ -27,6 +27,7 @@ NAME = "controllers/reproducible_chatter"
 EXAMPLE = ROOT / "examples/equal_bits"
 SHORT = 10_000  # samples
 COMPILERS, LEVELS, WIDTHS = ("gcc", "clang"), ("-O0", "-O1", "-O2", "-O3"), (1, 2, 4, 8, 16)
+ALONE = (2, 4)  # lanes of a run alone
 PACKAGES = {
     "aarch64": "gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user",
     "riscv64": "gcc-riscv64-linux-gnu libc6-dev-riscv64-cross qemu-user",
@@ -141,8 +142,11 @@ def test_a_lane_of_a_batch_gives_the_promised_bits(runs: int, lane: int) -> None
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_every_build_gives_the_promised_bits(compiler: str, level: str, require_tool: Tool) -> None:
     assert hash_of(chatter(), build(require_tool, compiler, flags=(level,), engine="casadi")) == WHOLE
+    native = (level, "-march=native")
+    for width in ALONE:
+        assert hash_of(chatter(), build(require_tool, compiler, flags=native, width=width, alone=True)) == WHOLE
     for width in WIDTHS:
-        built = build(require_tool, compiler, flags=(level, "-march=native"), width=width)
+        built = build(require_tool, compiler, flags=native, width=width)
         assert hash_of(chatter(), built) == WHOLE
         assert hash_of(chatter(SHORT), built, width + 3, width + 1) == BEGINNING
 
@@ -182,6 +186,15 @@ def test_exported_c_gives_the_promised_bits(
     samples, wanted = (1_000_000, WHOLE) if level == "-O3" else (SHORT, BEGINNING)
     settings = (f"CC={require_tool(compiler)}", f"LEVEL={level}", f"SAMPLES={samples}")
     assert made("host", export, tmp_path, *settings) == wanted
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("level", LEVELS[:-1])
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_exported_c_goes_all_the_way(
+    compiler: str, level: str, export: Path, tmp_path: Path, require_tool: Tool
+) -> None:
+    assert made("host", export, tmp_path, f"CC={require_tool(compiler)}", f"LEVEL={level}") == WHOLE
 
 
 @pytest.mark.parametrize("target", list(PACKAGES))

@@ -4,16 +4,29 @@ import itertools
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from typing import get_args
+from functools import cache
+from typing import Any, get_args
 
 import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from springline.codegen.kernel import Engine, KernelOptions, KernelSpec, LoopSettings, Runs, lanes, toolchain
+from springline.codegen.kernel import (
+    Engine,
+    Kernel,
+    KernelOptions,
+    KernelSource,
+    KernelSpec,
+    LoopSettings,
+    Runs,
+    Shape,
+    Span,
+    lanes,
+    print_kernel,
+    toolchain,
+)
 from springline.codegen.kernel.compiled import compile_kernel
-from springline.codegen.kernel.source import print_kernel
 from springline.codegen.program import LoopGraph, Program
 from springline.model.symbolic import as_written
 from springline.model.terms import Term
@@ -117,30 +130,137 @@ def test_clang_equals_gcc(
         assert_same(run(shaken, table, options, sampled=sampled, settings=replace(SHORT, hold=5)), expected)
 
 
+Build = dict[str, Any]
+BUILDS: dict[str, tuple[Any, ...]] = {
+    "loop": ("continuous", "sampled"),
+    "compiler": ("gcc", "clang"),
+    "level": ("-O0", "-O1", "-O2", "-O3"),
+    "machine": ("x86-64", "x86-64-v3", "native", "x86-64-v4"),
+    "kind": ("casadi", 1, 2, 4, 8, 16, "alone 2", "alone 4"),
+    "groups": (1, 2),
+    "packs": (1, 2, 3),
+    "span": get_args(Span),
+    "parameters": ("tunable", "baked"),
+}
+"""What a build may differ in. Kind: CasADi's C, so many lanes, or a run alone in so many."""
+
+
+def exists(build: Build) -> bool:
+    """Whether there is such a build, as far as it is said what it is: a dimension without a choice has its first."""
+    kind = build.get("kind")
+    if isinstance(kind, str):  # one run at a time
+        free = ("groups", "packs", *(("span", "parameters") if kind == "casadi" else ()))
+        return all(build.get(name, BUILDS[name][0]) == BUILDS[name][0] for name in free)
+    # Vectors that a machine lacks are taken apart: whole steps of them keep gcc busy for a minute.
+    return kind != 16 or build.get("span", "evaluation") == "evaluation"
+
+
+def pairs_of(builds: list[Build]) -> set[frozenset[tuple[str, Any]]]:
+    """What any two dimensions are together in some build."""
+    return {frozenset(pair) for build in builds for pair in itertools.combinations(build.items(), 2)}
+
+
+def pairwise(dimensions: dict[str, tuple[Any, ...]]) -> list[Build]:
+    """Few builds in which every value of each dimension meets every one of each other, as far as both can be."""
+    values = [[(name, value) for value in choice] for name, choice in dimensions.items()]
+    pairs = (pair for both in itertools.combinations(values, 2) for pair in itertools.product(*both))
+    left = {frozenset(pair): None for pair in pairs if exists(dict(pair))}  # in this order, which a set has not
+    found = []
+    while left:
+        build = dict(next(iter(left)))
+
+        def new(value: tuple[str, Any], build: Build = build) -> int:
+            return sum(frozenset((value, each)) in left for each in build.items())
+
+        for name, choice in zip(dimensions, values, strict=True):
+            if name not in build:
+                build.update([max((value for value in choice if exists({**build, name: value[1]})), key=new)])
+        found.append({name: build[name] for name in dimensions})
+        for pair in pairs_of([build]):
+            left.pop(pair, None)
+    return found
+
+
+# With AVX-512 apart, so that machines without it leave no pair out.
+PAIRS = [
+    build
+    for machines in (BUILDS["machine"][:-1], BUILDS["machine"][-1:])
+    for build in pairwise({**BUILDS, "machine": machines})
+]
+
+
+def options_of(build: Build) -> KernelOptions:
+    """How it is printed; what the build does not say, as it pays."""
+    kind = build["kind"]
+    if kind == "casadi":
+        return KernelOptions(engine="casadi")
+    shape = {name: build[name] for name in ("groups", "packs", "span") if name in build}
+    if isinstance(kind, str):
+        return KernelOptions(width=int(kind.removeprefix("alone ")), alone=True, **shape)
+    return KernelOptions(width=kind, **shape)
+
+
+@cache
+def printed(program: Program, spec: KernelSpec) -> KernelSource:
+    """The C, once for all that compile it."""
+    return print_kernel(program, spec)
+
+
+@pytest.fixture(scope="module")
+def assert_build(
+    shaken: Program, table: NDArray[np.float64], require_tool: Callable[..., str]
+) -> Callable[[Build], None]:
+    """assert_build(build): it gives the bits of CasADi's C by gcc -O2, one run at a time."""
+    settings, keys = replace(SHORT, hold=5), [slot.key for slot in shaken.system.slots]
+
+    @cache
+    def expected(sampled: bool) -> Runs:
+        options = KernelOptions(engine="casadi", flags=("-O2",))
+        return run(shaken, table, options, sampled=sampled, settings=settings)
+
+    def check(build: Build) -> None:
+        compiler = toolchain.probe_compiler([require_tool(build["compiler"])])
+        assert compiler is not None
+        if build["machine"] == "x86-64-v4" and toolchain.native_vector_width(compiler) < 8:
+            pytest.skip("this machine has no AVX-512")
+        sampled, baked = build["loop"] == "sampled", build["parameters"] == "baked"
+        constants = (VARIED, tuple(table[0])) if baked else (None, ())
+        spec = KernelSpec(shaken.system.structure, sampled, *constants, replace(options_of(build), flags=()))
+        source = printed(shaken, spec)
+        source = replace(source, flags=(build["level"], f"-march={build['machine']}", *source.flags))
+        kernel = Kernel(Shape.of(shaken.system), source, compiler)
+        found = kernel.run(table[:, [keys.index(key) for key in kernel.parameters]], settings)
+        assert_same(found, expected(sampled))
+
+    return check
+
+
+def test_pairs_of_builds_leave_none_out() -> None:
+    """Every build that there is has no pair that is not tested, and the tested ones are builds that there are."""
+    whole = [dict(zip(BUILDS, values, strict=True)) for values in itertools.product(*BUILDS.values())]
+    assert pairs_of([build for build in whole if exists(build)]) == pairs_of(PAIRS)
+    assert all(exists(build) for build in PAIRS)
+    assert len(PAIRS) < 100
+
+
 @pytest.mark.full
-@pytest.mark.parametrize("machine", ["x86-64", "x86-64-v3", "x86-64-v4", "native"])
-@pytest.mark.parametrize("level", ["-O0", "-O1", "-O2", "-O3"])
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_every_build(
-    compiler: str,
-    level: str,
-    machine: str,
-    reference: tuple[bool, Runs],
-    shaken: Program,
-    table: NDArray[np.float64],
-    require_tool: Callable[..., str],
-) -> None:
-    found = toolchain.probe_compiler([require_tool(compiler)])
-    assert found is not None
-    sampled, expected = reference
-    if machine == "x86-64-v4" and toolchain.native_vector_width(found) < 8:
-        pytest.skip("this machine has no AVX-512")
-    settings, flags = replace(SHORT, hold=5), (level, f"-march={machine}")
-    casadi = KernelOptions(engine="casadi", flags=flags, compiler=found)
-    assert_same(run(shaken, table, casadi, sampled=sampled, settings=settings), expected)
-    for width, groups, tunable in itertools.product((1, 2, 4, 8, 16), (1, 2), (None, VARIED)):
-        options = KernelOptions(width=width, groups=groups, flags=flags, compiler=found)
-        assert_same(run(shaken, table, options, tunable=tunable, sampled=sampled, settings=settings), expected)
+@pytest.mark.parametrize("build", PAIRS, ids=lambda build: " ".join(map(str, build.values())))
+def test_builds_that_meet_in_pairs(build: Build, assert_build: Callable[[Build], None]) -> None:
+    assert_build(build)
+
+
+@pytest.mark.product
+@pytest.mark.parametrize("loop", BUILDS["loop"])
+@pytest.mark.parametrize("machine", BUILDS["machine"])
+@pytest.mark.parametrize("level", BUILDS["level"])
+@pytest.mark.parametrize("compiler", BUILDS["compiler"])
+def test_every_build(compiler: str, level: str, machine: str, loop: str, assert_build: Callable[[Build], None]) -> None:
+    """The product with all kinds, groups and parameters; blocks and packs as they pay."""
+    code = {"loop": loop, "compiler": compiler, "level": level, "machine": machine}
+    for kind, groups, parameters in itertools.product(*(BUILDS[name] for name in ("kind", "groups", "parameters"))):
+        build = {**code, "kind": kind, "groups": groups, "parameters": parameters}
+        if exists(build) and (kind, groups) != (16, 2):  # a pair as well, and gcc's longest
+            assert_build({**build, "span": "evaluation"} if kind == 16 else build)
 
 
 @pytest.mark.parametrize(
