@@ -200,12 +200,6 @@ def options_of(build: Build) -> KernelOptions:
     return KernelOptions(width=kind, **shape)
 
 
-@cache
-def printed(program: Program, spec: KernelSpec) -> KernelSource:
-    """The C, once for all that compile it."""
-    return print_kernel(program, spec)
-
-
 @pytest.fixture(scope="module")
 def assert_build(
     shaken: Program, table: NDArray[np.float64], require_tool: Callable[..., str]
@@ -218,6 +212,10 @@ def assert_build(
         options = KernelOptions(engine="casadi", flags=("-O2",))
         return run(shaken, table, options, sampled=sampled, settings=settings)
 
+    @cache
+    def printed(spec: KernelSpec) -> KernelSource:
+        return print_kernel(shaken, spec)
+
     def check(build: Build) -> None:
         compiler = toolchain.probe_compiler([require_tool(build["compiler"])])
         assert compiler is not None
@@ -226,7 +224,7 @@ def assert_build(
         sampled, baked = build["loop"] == "sampled", build["parameters"] == "baked"
         constants = (VARIED, tuple(table[0])) if baked else (None, ())
         spec = KernelSpec(shaken.system.structure, sampled, *constants, replace(options_of(build), flags=()))
-        source = printed(shaken, spec)
+        source = printed(spec)
         source = replace(source, flags=(build["level"], f"-march={build['machine']}", *source.flags))
         kernel = Kernel(Shape.of(shaken.system), source, compiler)
         found = kernel.run(table[:, [keys.index(key) for key in kernel.parameters]], settings)
