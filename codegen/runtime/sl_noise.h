@@ -70,7 +70,7 @@ static inline SL_NOISE_REAL SL_NOISE(noise_number)(SL_NOISE_WORD word) {
 }
 
 /* Standard normal numbers z[0] ... z[3] of channels 4 block ... 4 block + 3; of pairs, 1 asks for
- * the first two, 2 for the last two, 3 for both, and z is left as it is where none are asked for. */
+ * the first two, 2 for the last two, 3 for both; z is left as it is where none are asked for. */
 static inline void SL_NOISE(noise)(
     SL_NOISE_WORD seed,
     SL_NOISE_WORD run,

@@ -808,6 +808,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[object]:
         folder: Path,
         groups: list[int] | None = None,
         *,
+        inputs: str,
         overrides: dict[str, object] | None = None,
         force: bool = False,
         progress: object = None,
@@ -973,7 +974,7 @@ def test_doctor_says_what_is_missing() -> None:
     assert sick.exit_code == 1
     answer = json.loads(sick.stdout)
     assert answer["status"] == "failed"
-    assert [row["name"] for row in answer["rows"] if not row["ok"]] == ["C compiler"]
+    assert [row["name"] for row in answer["rows"] if row["ok"] is False] == ["C compiler"]
 
 
 def test_version_and_help() -> None:

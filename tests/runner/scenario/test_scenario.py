@@ -73,7 +73,8 @@ def slots(scenario: Scenario) -> dict[str, float]:
 def test_the_packaged_scenarios_are_those_of_the_design() -> None:
     rivals = {f"controllers/{name}" for name in CONTROLLERS if name != "terminal_sliding"}
     others = {"paper/nominal", "paper/as_printed", "controllers/reproducible_chatter", "ship/vessel_10hz"}
-    assert set(packaged_scenarios()) == {*GROUPS, *rivals, *others}
+    limited = {name.replace("paper/", "paper_motor_limit/") for name in (*GROUPS, "paper/nominal")}
+    assert set(packaged_scenarios()) == {*GROUPS, *rivals, *others, *limited}
 
 
 def test_an_empty_file_is_the_paper_s_nominal(load) -> None:
