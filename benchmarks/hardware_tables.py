@@ -18,21 +18,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from springline.benchmarks.sweep_pictures import run_whole
 from springline.codegen.kernel import CHATTERING
 from springline.model.control import CONTROLLERS
 from springline.runner.report import put
-from springline.runner.sweep import (
-    Dataset,
-    Plan,
-    load_sweep,
-    open_pool,
-    place,
-    read_dataset,
-    run_sweep,
-    summarize,
-    versions,
-    write_summary,
-)
+from springline.runner.sweep import read_dataset
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGE = DOCS / "hardware.md"
@@ -137,15 +127,8 @@ TABLES: Mapping[str, tuple[Callable[[pa.Table], Rows], str]] = {
 
 def answer(name: str, folder: Path) -> tuple[str, bytes]:
     """Run a packaged sweep into a folder: its table in Markdown, and its picture as PNG."""
-    plan = Plan(load_sweep(name))
-    dataset = Dataset(place(str(folder)))
-    dataset.begin(plan, versions(), resume=False)
-    with open_pool(None, "") as pool:
-        tally = run_sweep(plan, dataset, pool, set())
-    if tally.left:
-        raise RuntimeError(f"{name}: {tally.left} runs are missing: {tally.failures}")
+    run_whole(name, folder)
     rows, figure = TABLES[name]
-    write_summary(plan, dataset, summarize(plan, dataset))
     return "".join(f"{row}\n" for row in rows(read_dataset(folder))), (folder / f"{figure}.png").read_bytes()
 
 

@@ -36,8 +36,8 @@ SHOWN: Mapping[str, str] = {
 """Name of a packaged sweep -> which of its figures the page shows."""
 
 
-def picture(name: str, folder: Path) -> bytes:
-    """Run a packaged sweep into a folder: its picture as PNG."""
+def run_whole(name: str, folder: Path) -> None:
+    """Run a packaged sweep into a folder, with its figures. Raises RuntimeError where runs are missing."""
     plan = Plan(load_sweep(name))
     dataset = Dataset(place(str(folder)))
     dataset.begin(plan, versions(), resume=False)
@@ -46,7 +46,6 @@ def picture(name: str, folder: Path) -> bytes:
     if tally.left:
         raise RuntimeError(f"{name}: {tally.left} runs are missing: {tally.failures}")
     write_summary(plan, dataset, summarize(plan, dataset))
-    return (folder / f"{SHOWN[name]}.png").read_bytes()
 
 
 def main() -> int:
@@ -58,7 +57,8 @@ def main() -> int:
         parser.error(f"there is no {IMAGES}: run it in a checkout")
     for name in SHOWN:
         with tempfile.TemporaryDirectory() as folder:
-            content = picture(name, Path(folder) / name)
+            run_whole(name, Path(folder) / name)
+            content = (Path(folder) / name / f"{SHOWN[name]}.png").read_bytes()
         sys.stdout.write(f"{name}: {len(content)} bytes\n")
         sys.stdout.flush()
         if write:

@@ -304,7 +304,7 @@ def _delta(work: _Work) -> list[Row]:
     boundary = delta_critical(work.scenario, work.amplitude)[0]
     work.at[name] = boundary.at
     others = [delta_critical(work.scenario, amplitude)[0] for amplitude in AMPLITUDES] if boundary.value else []
-    given = float(work.scenario.value_of(key)) if key in keys else math.nan  # type: ignore[arg-type] # a number
+    given = work.scenario.number_of(key) if key in keys else math.nan
     if work.unbounded and boundary.value is not None:
         text = f"no finite boundary: {work.unbounded}, so that every delta ends in a limit cycle"
         return [Row(name, None, unit, False if work.unstable else None, text + _cycle_text(work))]
@@ -408,7 +408,7 @@ def _epsilon(work: _Work) -> list[Row]:
         if ok
         else "too close for a design of two time scales: stiffer springs, lighter motors, or a slower law"
     )
-    epsilon = float(work.scenario.value_of("drive.epsilon"))  # type: ignore[arg-type] # a number
+    epsilon = work.scenario.number_of("drive.epsilon")
     text = f"{what}; {spread}: {verdict} (epsilon = {epsilon:g} only scales, the ratio decides)"
     return [Row("epsilon_ratio", float(ratios[k]), "1", ok, text)]
 
@@ -453,7 +453,7 @@ def _k1(work: _Work) -> list[Row]:
     if proof is None:
         rows = [Row("k1_margin", None, unit, None, reason)]
         return rows + [Row(f"k1_margin_{joint.name}", None, f"{joint.unit}/s^2", None, reason) for joint in work.joints]
-    k1 = float(work.scenario.value_of("control.k1"))  # type: ignore[arg-type] # a number
+    k1 = work.scenario.number_of("control.k1")
     largest = proof.disturbed.per_joint
     margins = k1 - largest
     k = int(np.argmin(margins))

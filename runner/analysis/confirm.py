@@ -211,9 +211,7 @@ def _plant(scenario: Scenario, name: str, joint: int) -> float:
     """A number of the plant, which may be one for all joints or the joint's own."""
     keys = {slot.key for slot in scenario.system().slots}
     key = f"plant.{name}" if f"plant.{name}" in keys else f"plant.{name}.{joint}"
-    value = scenario.value_of(key)
-    assert isinstance(value, float)
-    return value
+    return scenario.number_of(key)
 
 
 def bisected(grows: Callable[[Floats], Sequence[bool]], expected: float, *, above: bool) -> tuple[float | None, int]:

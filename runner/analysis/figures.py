@@ -37,7 +37,7 @@ def spectrum_by_delta(found: Analysis) -> Figure | None:
     keys = found.scenario.numeric_keys()
     if row.value is None or key not in keys:
         return None
-    given = float(found.scenario.value_of(key))  # type: ignore[arg-type] # a number
+    given = found.scenario.number_of(key)
     low, high = min(row.value, given or row.value) / 4, max(row.value, given) * 4
     layers = np.geomspace(low, high, _LAYERS)
     figure, grid = panels(width=COLUMN, height=2.0)

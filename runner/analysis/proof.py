@@ -117,8 +117,7 @@ def _sliding(system: System) -> ca.Function:
 
 
 def _per_joint(scenario: Scenario, name: str) -> Floats:
-    numbers = [scenario.value_of(f"control.{name}.{i}") for i in range(scenario.system().n)]
-    return np.array(numbers, dtype=np.float64)
+    return np.array([scenario.number_of(f"control.{name}.{i}") for i in range(scenario.system().n)])
 
 
 def proof_of(scenario: Scenario, columns: Mapping[str, Floats]) -> Proof:

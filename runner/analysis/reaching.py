@@ -86,7 +86,7 @@ def law_curves(scenario: Scenario, start: Floats) -> dict[str, LawCurves]:
     system, structure = scenario.system(), scenario.structure()
     if system.controller.law is None:
         return {}
-    limits = np.array([scenario.value_of(f"control.a_max.{i}") for i in range(system.n)], dtype=np.float64)
+    limits = np.array([scenario.number_of(f"control.a_max.{i}") for i in range(system.n)])
     sigma = np.geomspace(1e-5, max(10.0, float(np.max(np.abs(start), initial=0.0))), 241)
     amplitude = np.geomspace(1e-6, 10.0, 141)
     curves = {}

@@ -62,11 +62,11 @@ def varied_keys(scenario: Scenario) -> dict[str, float]:
     for slot in scenario.system().slots:
         table, _, name = slot.key.partition(".")
         if table in _TABLES:
-            key, value = slot.key, float(scenario.value_of(slot.key))  # type: ignore[arg-type] # a slot's is a number
+            key, value = slot.key, scenario.number_of(slot.key)
         elif table == "plant" and f"mechanism.{name}" in keys:
             head, *place = name.split(".")
             key = ".".join(["plant", head, "scale", *place])
-            own, nominal = (float(scenario.value_of(k)) for k in (slot.key, f"mechanism.{name}"))  # type: ignore[arg-type]
+            own, nominal = (scenario.number_of(k) for k in (slot.key, f"mechanism.{name}"))
             value = own / nominal if nominal else 0.0
         else:
             continue

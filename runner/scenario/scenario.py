@@ -265,6 +265,16 @@ class Scenario:
             raise InputError(unknown(self.source, key, "key", key, [*entries, *self.numeric_keys()]))
         return entries[name]
 
+    def number_of(self, key: str) -> float:
+        """The value of a dotted key that has one number, as `value_of`.
+
+        Raises InputError if there is no such key, TypeError if its value is no number.
+        """
+        value = self.value_of(key)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise TypeError(f"{key} is {value!r}, expected a number")
+        return float(value)
+
     def numeric_keys(self) -> dict[str, NumericKey]:
         """Every number that may vary within the structure, by dotted key."""
         return dict(numeric_keys(self.system()))

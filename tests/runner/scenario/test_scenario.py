@@ -793,8 +793,13 @@ def test_value_of_is_what_the_run_uses() -> None:
     assert scenario.value_of("plant.m3") == 48.0
     assert scenario.value_of("plant.m2") == 10.0
     assert scenario.value_of("simulation.output_every") == 10
+    assert scenario.number_of("plant.m3") == 48.0
     with pytest.raises(InputError, match=r"did you mean 'control\.delta'"):
         scenario.value_of("control.delt")
+    with pytest.raises(TypeError, match=r"control\.law is 'variable_power_log', expected a number"):
+        scenario.number_of("control.law")
+    with pytest.raises(TypeError, match="expected a number"):
+        scenario.number_of("control.fast")
 
 
 @given(st.floats(allow_nan=True, allow_infinity=True))
