@@ -134,7 +134,8 @@ def _effect(runs: Runs, axes: Axes, key: str, metric: str, points: NDArray[np.bo
         axes.plot(x[shown], y[shown], ".", color=color, markersize=2.2, alpha=0.5, markeredgewidth=0, rasterized=True)
         at, bands = _running(x[chosen], y[chosen])
         if len(at) > 1:
-            axes.fill_between(at, bands[0], bands[2], color=color, alpha=0.15, linewidth=0)
+            band = None if several else f"middle {100 * (_BAND[-1] - _BAND[0]):.0f} % of runs"
+            axes.fill_between(at, bands[0], bands[2], color=color, alpha=0.15, linewidth=0, label=band)
             line = LINES[g] if several else {"color": "black"}
             axes.plot(at, bands[1], label=name if several else "median", **line)
     stopped = ~ok & points & np.isfinite(x)
