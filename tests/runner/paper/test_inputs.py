@@ -28,6 +28,18 @@ def test_both_sets_have_every_case_and_differ_in_inputs_alone() -> None:
         assert all(map(math.isinf, others["a_max"]))
 
 
+@pytest.mark.parametrize("inputs", INPUTS)
+def test_a_set_is_one_set(inputs: str) -> None:
+    """The same limits, boundary layer, inertia and heave in all of its scenarios."""
+    every = [load_scenario(under(inputs, case.scenario)).document for case in CASES]
+    nominal = load_scenario(under(inputs, "paper/nominal")).document
+    for key in ("a_max", "U_max", "delta"):
+        assert {str(one["control"][key]) for one in every} == {str(nominal["control"][key])}
+    assert {str(one["mechanism"]) for one in every} == {str(nominal["mechanism"])}
+    heaves = {str(one["base_motion"]["heave"]) for one in every if one["base_motion"].get("heave")}
+    assert len(heaves) == 1
+
+
 def test_13_numbers_of_group_2_lie_within_30_percent_where_the_motors_are_limited() -> None:
     found = study([2], whole=False, inputs="motor_limit")
     met = score(cases([2]), found.evidence.runs, list(MEASURES), list(JOINTS))
