@@ -38,6 +38,14 @@ def test_a_formula_by_itself_is_mathml() -> None:
 
 
 @pytest.mark.parametrize(
+    ("tex", "tags"), [("q_1", "msub mi mn"), ("x^2", "msup mi mn"), ("H^{-1}", "msup mi mrow mo mn")]
+)
+def test_what_stands_below_and_above_in_mathml(tex: str, tags: str) -> None:
+    math = ElementTree.fromstring(to_mathml(tex))  # noqa: S314 - ours
+    assert " ".join(each.tag for each in math[0][0].iter()) == tags
+
+
+@pytest.mark.parametrize(
     ("tex", "told"),
     [
         (r"\integral x", r"\integral is not known"),
