@@ -17,7 +17,7 @@ from springline.runner.analysis.loop import linear_loop
 from springline.runner.analysis.reaching import AMPLITUDES, LawCurves
 from springline.runner.analysis.sampled import cut, rates_of
 from springline.runner.analysis.sensitivity import Effect, Sensitivities
-from springline.runner.report import COLUMN, LINES, PAGE, label, legend_above, panels
+from springline.runner.report import LINES, PAGE, label, legend_above, panels
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -40,7 +40,7 @@ def spectrum_by_delta(found: Analysis) -> Figure | None:
     given = found.scenario.number_of(key)
     low, high = min(row.value, given or row.value) / 4, max(row.value, given) * 4
     layers = np.geomspace(low, high, _LAYERS)
-    figure, grid = panels(width=COLUMN, height=2.0)
+    figure, grid = panels(width=PAGE, height=2.6)
     axes = grid[0, 0]
     amplitudes = sorted({AMPLITUDES[0], found.scenario.sigma_amplitude, AMPLITUDES[1]})
     for line, amplitude in zip(LINES, amplitudes, strict=False):
@@ -68,7 +68,7 @@ def _ticks(axes: Axes, values: Floats) -> None:
 
 def along_reference(found: Analysis) -> Figure:
     """How fast the least stable mode dies out along the reference; with ranges, the most and the least of them."""
-    figure, grid = panels(width=COLUMN, height=1.8)
+    figure, grid = panels(width=PAGE, height=2.2)
     axes = grid[0, 0]
     opened = cut(found.loop)
     values = np.linalg.eigvals(opened.closed[0])
@@ -97,7 +97,7 @@ def channels(found: Analysis) -> Figure:
     sizes = np.abs(poles[np.abs(poles) > 1e-6])
     highest = 10 * float(sizes.max()) if opened.period is None else np.pi / opened.period
     omega = np.geomspace(max(float(sizes.min()) / 10, highest * 1e-5), highest, 1500)
-    figure, grid = panels(2, 1, width=COLUMN, height=1.6)
+    figure, grid = panels(2, 1, width=PAGE, height=1.8)
     for joint, line in zip(range(loop.n), LINES * loop.n, strict=False):
         others = [k for k in range(loop.n) if k != joint]
         inner = f + g[:, others] @ c[others]
