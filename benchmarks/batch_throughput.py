@@ -65,7 +65,7 @@ def kernel_times(plan: Plan, threads: int) -> Times:
     work = plan.groups[0].work
     loop, settings = work.kernel(), replace(work.settings, output_every=0)
     chunks = [plan.chunk(k) for k in range(plan.chunks)]
-    parameters = np.concatenate([plan.parameters(chunk, plan.columns(chunk)) for chunk in chunks])
+    parameters = np.concatenate([plan.inputs(chunk, plan.columns(chunk)).parameters for chunk in chunks])
     pieces = [parameters[i : i + plan.chunk_size] for i in range(0, len(parameters), plan.chunk_size)]
     with ThreadPoolExecutor(threads) as pool:
         watch = Stopwatch()

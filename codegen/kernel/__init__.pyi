@@ -5,6 +5,7 @@ from .compiled import Kernel as Kernel
 from .compiled import Shape as Shape
 from .compiled import Watch as Watch
 from .compiled import kernel as kernel
+from .metrics import BANDS as BANDS
 from .paying import Span as Span
 from .runs import CHATTERING as CHATTERING
 from .runs import METRICS as METRICS

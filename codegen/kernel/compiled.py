@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from springline.codegen.kernel import toolchain
 from springline.codegen.kernel.job import Job, Struct
+from springline.codegen.kernel.metrics import BANDS
 from springline.codegen.kernel.runs import METRICS, STATUS, Runs
 from springline.codegen.kernel.settings import LoopSettings
 from springline.codegen.kernel.source import KernelSource, print_kernel
@@ -55,6 +56,7 @@ _LAYOUT = (
     "bytes of a job",
     "bytes of a table",
     "parameters of a run",
+    "bands of a run",
     "tables",
     "states",
     "metrics",
@@ -105,6 +107,7 @@ class Kernel:
             ctypes.sizeof(Job),
             ctypes.sizeof(_Table),
             len(self.parameters),
+            len(BANDS),
             len(shape.tables),
             shape.states,
             shape.joints * len(METRICS),
@@ -119,11 +122,13 @@ class Kernel:
         tables: Sequence[SignalTable] = (),
         *,
         numbers: Sequence[int] | None = None,
+        bands: Floats | None = None,
         watch: Watch | None = None,
     ) -> Runs:
         """Simulate one run per row of `parameters` (runs, len(self.parameters)), in this thread, without the GIL.
 
         numbers  of the runs, 0 or more, which the noise of sensors goes by; None for 0 in all of them
+        bands    (runs, len(BANDS)), what the metrics of each take for settled; None for those of the settings in all
         Raises ValueError if `parameters` or `tables` do not have the shape the kernel was built for, and for results
         that this machine's memory cannot hold; TypeError or ValueError for numbers that are no doubles.
         """
@@ -161,6 +166,9 @@ class Kernel:
         counted = np.zeros(runs, np.int64) if numbers is None else np.array(numbers, dtype=np.int64)
         if counted.shape != (runs,) or np.any(counted < 0):
             raise ValueError(f"numbers are {shown(numbers)}, expected one of 0 or more for each of {runs} runs")
+        judged = np.tile(settings.bands, (runs, 1)) if bands is None else doubles(bands)
+        if judged.shape != (runs, len(BANDS)) or not np.all(np.isfinite(judged)):
+            raise ValueError(f"bands have shape {judged.shape}, expected ({runs}, {len(BANDS)}) finite numbers")
         rows = settings.rows
         needed, there = 8 * runs * rows * self.shape.columns, memory()
         if needed > there:
@@ -188,13 +196,10 @@ class Kernel:
             hold=settings.hold,
             delay=delay,
             output_every=settings.output_every,
-            response_band=settings.response_band,
-            settling_band=settings.settling_band,
-            response_error=settings.response_error,
-            settling_error=settings.settling_error,
             seed=settings.seed,
             numbers=None if numbers is None else counted.ctypes.data,
             parameters=parameters.ctypes.data,
+            bands=judged.ctypes.data,
             tables=ctypes.addressof(c_tables),
             metrics=result.metrics.ctypes.data,
             final_state=result.final_state.ctypes.data,

@@ -46,6 +46,15 @@ _WITHIN: Mapping[Part, str] = {"run": "run", "second half": "half", "last quarte
 """Part of a run -> what sl_instant calls it; where "settled" begins is another time in each lane."""
 
 
+BANDS = tuple(symbols(SETTINGS))
+"""What the metrics of a run take for settled, in the order in which the loop is given it."""
+
+
+def _band(name: str) -> str:
+    """What C calls one of BANDS."""
+    return f"SL_{name.upper()}"
+
+
 class _Statements:
     """The body of a C function that computes nodes of a graph, on vectors ("slv") or on numbers ("sl").
 
@@ -160,7 +169,7 @@ class _Printer:
     def _load(self, places: Mapping[str, str]) -> Callable[[str, int], str]:
         """How an input is read: `places` has a pattern for each."""
         members = {name: list(symbols(NOW)) for name in ("now", "first", "before", "last")}
-        members |= {"settings": list(symbols(SETTINGS)), "run": list(symbols(RUN))}
+        members |= {"settings": [_band(name) for name in BANDS], "run": list(symbols(RUN))}
         members["fold"] = [str(k) for k in range(len(self.folds))]
         return lambda name, k: places[name].format(members[name][k])
 
@@ -178,7 +187,7 @@ class _Printer:
         staged = [i for i in early if graph.nodes[i].op is not None and graph.nodes[i].binding is Binding.RUN]
         once = {i: f"m->once[{k}]" for k, i in enumerate(staged)}
 
-        places = {"now": "at.{}", "first": "m->first.{}", "before": "m->last.{}", "settings": "slv_set(job->{})"}
+        places = {"now": "at.{}", "first": "m->first.{}", "before": "m->last.{}", "settings": "bands[{}][g]"}
         start = _Statements(graph, "slv", self._load(places))
         for name in sources:
             start.add(f"m->first.{name} = m->last.{name} = at.{name};")
@@ -205,6 +214,9 @@ class _Printer:
 
 enum {{ SL_METRICS_PER_JOINT = {len(METRICS)} }};
 
+/* What metrics take for settled: SETTINGS in model/metrics.py. */
+enum sl_band {{ {", ".join(map(_band, BANDS))}, SL_NBANDS }};
+
 /* What metrics are made of, of one joint on one group of lanes. */
 typedef struct {{
 {members}}} sl_sample;
@@ -219,7 +231,7 @@ static inline sl_sample kernel_sample(const sl_group *x, const sl_group *u, cons
   }};
 }}
 
-static inline void kernel_metrics_start(sl_metrics *m, sl_sample at, const sl_job *job) {{
+static inline void kernel_metrics_start(sl_metrics *m, sl_sample at, const sl_group *bands, int g) {{
 {started}
 }}
 
@@ -227,8 +239,9 @@ static inline void kernel_metrics_sample(sl_metrics *m, sl_instant now, sl_sampl
 {sampled}
 }}
 
-/* Metrics of a lane into out[SL_METRICS_PER_JOINT]; NaN where there is none. */
-static inline void kernel_metrics_finish(const sl_metrics *m, int lane, sl_span run, const sl_job *job, double *out) {{
+/* Metrics of a lane, with its own bands[SL_NBANDS], into out[SL_METRICS_PER_JOINT]; NaN where there is none. */
+static inline void kernel_metrics_finish(const sl_metrics *m, int lane, sl_span run, const double *bands,
+                                         double *out) {{
 {finished}
 }}
 """
@@ -275,7 +288,7 @@ static inline void kernel_metrics_finish(const sl_metrics *m, int lane, sl_span 
         ]
         (nodes,) = graph.add("finish", function, inputs)
         places = {"first": "slv_get(m->first.{}, lane)", "last": "slv_get(m->last.{}, lane)"}
-        places |= {"settings": "job->{}", "run": "run.{}", "fold": "fold{}"}
+        places |= {"settings": "bands[{}]", "run": "run.{}", "fold": "fold{}"}
         body = _Statements(graph, "sl", self._load(places))
         for k, fold in enumerate(self.folds):
             text = f"slv_get(m->fold[{k}], lane)"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from springline.codegen.kernel.metrics import BANDS
 from springline.codegen.numbers import double, real, whole
 
 MOST_STEPS = 2**53
@@ -62,6 +63,11 @@ class LoopSettings:
             raise ValueError(f"limits are {self.limits!r}, expected a pair low < high for each joint")
         object.__setattr__(self, "limits", tuple(pairs))
         real("end, start_time + steps * step,", self.start_time + self.steps * self.step)
+
+    @property
+    def bands(self) -> tuple[float, ...]:
+        """What the metrics take for settled, in the order of BANDS."""
+        return tuple(getattr(self, name) for name in BANDS)
 
     @property
     def rows(self) -> int:

@@ -136,6 +136,7 @@ typedef struct {
 #if SL_NNOISE > 0
   sl_b number[SL_G]; /* that the noise of a run goes by */
 #endif
+  sl_group bands[SL_NBANDS]; /* of the metrics */
   int64_t samples;                  /* that the metrics have seen */
   sl_metrics metrics[SL_NJ][SL_G];
   sl_clock *clock;
@@ -217,12 +218,13 @@ static void finish_lane(sl_pack *pack, int lane, int64_t k, enum sl_status statu
   const int64_t run = pack->run[lane];
   const double end = step_time(job, k), half = (double)(job->steps - job->steps / 2) * job->step;
   const sl_span span = {job->start_time, end - job->start_time, half, job->step, status == SL_OK};
+  const double *bands = job->bands + run * SL_NBANDS;
   double *metrics = job->metrics + run * SL_NMETRICS;
   int i;
   for (i = 0; i < SL_NX; i++) job->final_state[run * SL_NX + i] = lane_of(pack->x[i], lane);
   for (i = 0; i < SL_NMETRICS; i++) metrics[i] = SL_NAN;
   for (i = 0; i < SL_NJ && pack->samples > 0; i++) {
-    kernel_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, span, job, metrics + i * SL_METRICS_PER_JOINT);
+    kernel_metrics_finish(&pack->metrics[i][lane / SL_W], lane % SL_W, span, bands, metrics + i * SL_METRICS_PER_JOINT);
   }
   job->end_time[run] = end;
   job->status[run] = (int32_t)status;
@@ -314,7 +316,9 @@ static void observe(sl_pack *pack, int64_t k, sl_time now) {
   const sl_group *sigma = (const sl_group *)pack->sigma;
   int i, g;
   for (i = 0; k == 0 && i < SL_NJ; i++) {
-    for (g = 0; g < SL_G; g++) kernel_metrics_start(&pack->metrics[i][g], kernel_sample(x, u, e, sigma, i, g), job);
+    for (g = 0; g < SL_G; g++) {
+      kernel_metrics_start(&pack->metrics[i][g], kernel_sample(x, u, e, sigma, i, g), (const sl_group *)pack->bands, g);
+    }
   }
   if (!control_is_finite(pack)) stop_overflows(pack, k, now);
   for (i = 0; i < SL_NJ; i++) {
@@ -486,6 +490,7 @@ static void load_pack(sl_pack *pack, const sl_job *job, int64_t first, sl_clock 
     pack->run[lane] = run;
     pack->alive[lane] = lane < pack->lanes;
     for (i = 0; i < SL_NP; i++) set_lane(pack->p[i], lane, job->parameters[run * SL_NP + i]);
+    for (i = 0; i < SL_NBANDS; i++) set_lane(pack->bands[i], lane, job->bands[run * SL_NBANDS + i]);
     if (lane < pack->lanes && job->rows) job->rows[run] = 0;
 #if SL_NNOISE > 0
     SL_LANE(pack->number[lane / SL_W], lane % SL_W) = job->numbers ? (uint64_t)job->numbers[run] : 0;
@@ -616,8 +621,8 @@ static void run_packs(sl_pack *packs, int count, const sl_job *job) {
  * how many there are.
  */
 __attribute__((visibility("default"))) int64_t springline_layout(int64_t *layout, int64_t room) {
-  static const int64_t sizes[] = {SL_RUNS * SL_PACKS, sizeof(sl_job), sizeof(sl_table), SL_NP,       SL_NTABLES,
-                                  SL_NX,              SL_NMETRICS,    SL_NCOLUMNS,      SL_STATUSES};
+  static const int64_t sizes[] = {SL_RUNS * SL_PACKS, sizeof(sl_job), sizeof(sl_table), SL_NP,       SL_NBANDS,
+                                  SL_NTABLES,         SL_NX,          SL_NMETRICS,      SL_NCOLUMNS, SL_STATUSES};
   const int64_t count = sizeof sizes / sizeof *sizes;
   int64_t i;
   for (i = 0; i < count && i < room; i++) layout[i] = sizes[i];

@@ -21,6 +21,7 @@ from .scenario import weighs as weighs
 from .schema import DOORS as DOORS
 from .schema import DOOR_KEYS as DOOR_KEYS
 from .schema import TIMING_UNITS as TIMING_UNITS
+from .schema import excluded_bands as excluded_bands
 from .schema import given_text as given_text
 from .schema import names_file as names_file
 from .schema import number_text as number_text

@@ -88,7 +88,10 @@ def resolve(
         if not wrong and document[name].get("kind") == "table":
             with_table.append(name)
 
-    problems += _band_problems(document["simulation"], given["simulation"], where)
+    problems += schema.excluded_bands([f"simulation.{key}" for key in given["simulation"]], where)
+    for band, other in schema.BANDS:
+        if other not in given["simulation"]:
+            document["simulation"].setdefault(band, schema.DEFAULT_BANDS[band])
     problems += _start_problems(document["initial"], given["initial"], where)
     problems += _limit_problems(document, where)
     problems += _via_point_problems(document["reference"], where)
@@ -205,18 +208,6 @@ def _section_of_kind(
         if of
     ]
     return misplaced or (kinds[kind], table | {"kind": kind})
-
-
-def _band_problems(simulation: dict[str, Any], given: Mapping[str, object], where: str) -> list[Problem]:
-    """A threshold is a fraction or an error, not both; `simulation` gets the one that counts."""
-    problems = []
-    for band, error in schema.BANDS:
-        if band in given and error in given:
-            text = f"does not go with simulation.{band}: give one of them"
-            problems.append(Problem(where, f"simulation.{error}", text, schema.given_text(given[error])))
-        elif error not in given:
-            simulation.setdefault(band, schema.DEFAULT_BANDS[band])
-    return problems
 
 
 _STARTS = ("q", "dq", "q_motor")

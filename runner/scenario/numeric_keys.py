@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from springline.model.parameters import POSITIVE, Bounds
+from springline.model.parameters import POSITIVE, UNIT_OPEN, Bounds
 from springline.model.structure import Structure
 from springline.model.system import System
 from springline.runner.scenario import schema
@@ -33,7 +33,8 @@ def numeric_keys(system: System) -> dict[str, NumericKey]:
     """The numeric keys of a system; who asks for every chunk of a sweep gets the same.
 
     "mechanism.m3" moves the controller's value, and the plant's unless the plant has its own; "plant.m3" and
-    "plant.m3.scale" move the plant's alone; "control.mu" moves all joints, "control.mu.0" one.
+    "plant.m3.scale" move the plant's alone; "control.mu" moves all joints, "control.mu.0" one. Bands of the metrics are
+    such keys too.
     """
     keys = {}
     groups: dict[str, list[str]] = {}
@@ -55,6 +56,20 @@ def numeric_keys(system: System) -> dict[str, NumericKey]:
         first = keys[leaves[0]]
         meaning = first.meaning.rpartition(" (")[0]
         keys[stem] = NumericKey(units, first.bounds, f"{meaning} (all joints)", tuple(leaves))
+    return keys | _band_keys(system)
+
+
+def _band_keys(system: System) -> dict[str, NumericKey]:
+    """What metrics take for settled, which moves nothing of the run itself."""
+    unit = schema.unit_text("{q}", system.joints)
+    keys = {}
+    for band, error in schema.BANDS:
+        of = f"band of the {band.partition('_')[0]} time"
+        for name, given in (
+            (band, ("1", UNIT_OPEN, f"{of}, a fraction of |e(0)|")),
+            (error, (unit, POSITIVE, f"{of}, an error")),
+        ):
+            keys[f"simulation.{name}"] = NumericKey(*given, (f"simulation.{name}",))
     return keys
 
 

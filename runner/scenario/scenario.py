@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from springline.codegen.kernel import lanes
+from springline.codegen.kernel import BANDS, lanes
 from springline.codegen.numbers import doubles
 from springline.codegen.program import program
 from springline.model.base import COORDINATES, shortest
@@ -310,8 +310,26 @@ class Scenario:
                 text = f"run {outside}: expected {schema.number_text(keys[name].bounds, keys[name].unit)}"
                 problems.append(Problem(self.source, name, text, schema.given_text(float(column[outside]))))
             result[name] = column
+        problems += schema.excluded_bands(columns, self.source)
         if problems:
             raise InputError(*problems)
+        return result
+
+    def bands_for(self, columns: Mapping[str, ArrayLike]) -> Floats | None:
+        """What the metrics of each run take for settled, (runs, len(BANDS)); None where it is the scenario's in all.
+
+        columns  as for `slots_for`, which raises InputError for them
+        An error that varies takes the place of the scenario's band, and a band that of its error.
+        """
+        given = self._numbers
+        checked = {name: values for name, values in self.columns_for(columns).items() if name in schema.EXCLUDED_BY}
+        if not checked:
+            return None
+        dropped = {schema.EXCLUDED_BY[name] for name in checked}
+        result = np.empty((len(next(iter(checked.values()))), len(BANDS)))
+        for column, name in zip(result.T, BANDS, strict=True):
+            key = f"simulation.{name}"
+            column[:] = checked.get(key, 0.0 if key in dropped else given.get(key, 0.0))
         return result
 
     def slots_for(self, columns: Mapping[str, ArrayLike]) -> Slots:
@@ -542,9 +560,8 @@ class Scenario:
             sections = {name: shape.sections[name] for name in ("plant", "control", "initial")}
             for name, section in (sections | {"drive": shape.kinds["drive"][str(drive)]}).items():
                 document[name] = {k: v for k, v in document[name].items() if k in section.model_fields}
-        for name, other in (*schema.BANDS, *((other, name) for name, other in schema.BANDS)):
-            if f"simulation.{name}" in overrides:
-                document["simulation"].pop(other, None)
+        for key in overrides:
+            document["simulation"].pop(schema.EXCLUDED_BY.get(key, "").rpartition(".")[2], None)
         given = {key.split(".")[1] for key in overrides if key.startswith("initial.")}
         if overrides.get("initial.on_reference"):
             document.pop("initial", None)

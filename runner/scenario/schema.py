@@ -6,7 +6,7 @@ Names, units, bounds and defaults of everything numeric come from the model's de
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Annotated, Any, Literal, cast, get_args
@@ -352,7 +352,20 @@ class Analysis(Section):
 
 BANDS = (("response_band", "response_error"), ("settling_band", "settling_error"))
 """Keys of [simulation] that exclude each other."""
+EXCLUDED_BY = {
+    f"simulation.{key}": f"simulation.{other}" for pair in BANDS for key, other in (pair, tuple(reversed(pair)))
+}
+"""Dotted key of a band or an error -> the one whose place it takes."""
 DEFAULT_BANDS = {"response_band": 0.10, "settling_band": 0.05}
+
+
+def excluded_bands(keys: Container[str], where: str, label: str = "") -> list[Problem]:
+    """What is wrong with dotted keys that name a band and the error in its place; `label` stands before each."""
+    return [
+        Problem(where, f"{label}simulation.{error}", f"does not go with simulation.{band}: give one of them")
+        for band, error in BANDS
+        if f"simulation.{band}" in keys and f"simulation.{error}" in keys
+    ]
 
 
 @dataclass(frozen=True)

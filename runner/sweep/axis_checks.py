@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from springline.codegen.numbers import double
 from springline.model.parameters import Bounds
 from springline.runner.files import InputError, Problem, unknown
-from springline.runner.scenario import NumericKey, Scenario, given_text, number_text
+from springline.runner.scenario import NumericKey, Scenario, excluded_bands, given_text, number_text
 from springline.runner.sweep.drawing import Drawing, spread
 from springline.runner.sweep.sweep import Axis, Sweep
 
@@ -34,6 +34,7 @@ class AxisChecks:
                 problems += self._number_problems(axis, source, self.numeric[axis.key])
             else:
                 problems += self._structural_problems(axis, source)
+        problems += excluded_bands(by_key, self.sweep.source, "vary.")
         if problems:
             raise InputError(*problems)
 

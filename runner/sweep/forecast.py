@@ -52,7 +52,7 @@ def _seconds_per_step(plan: Plan, group: Group) -> float:
     chunk = plan.chunk_of(group.first)
     work = chunk.group.work
     loop = work.kernel()
-    parameters = np.resize(plan.parameters(chunk, plan.columns(chunk)), (2 * loop.width, len(work.parameters)))
+    parameters = np.resize(plan.inputs(chunk, plan.columns(chunk)).parameters, (2 * loop.width, len(work.parameters)))
     steps = min(work.settings.steps, _CALIBRATION_STEPS)
     settings = replace(work.settings, steps=steps, output_every=0)
     best = float("inf")

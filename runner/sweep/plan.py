@@ -45,9 +45,7 @@ from springline.runner.sweep import sampling
 from springline.runner.sweep.axis_checks import AxisChecks
 from springline.runner.sweep.drawing import Columns, Drawing, grid_values
 from springline.runner.sweep.sweep import Axis, Sweep, is_number
-from springline.runner.sweep.work import Outcome, Work, work_for
-
-Floats = NDArray[np.float64]
+from springline.runner.sweep.work import TRAJECTORY_BYTES, Inputs, Outcome, Work, work_for
 
 MOST_GROUPS = 512
 _MOST_PANELS = 3
@@ -66,7 +64,6 @@ _FEWEST_STEPS = 4e6
 _LARGEST_CHUNK = 2048
 _CHUNKS = 32
 _FEWEST_CHUNKS = 8
-_TRAJECTORY_BYTES = 64e6
 _DRAWN_AT_ONCE = 8192
 _MOST_STEPS_IN_ALL = 2**63 - 1  # the counter of the loop's progress
 
@@ -164,7 +161,7 @@ class Plan:
         if self.sweep.keep:
             system, rows = self.groups[0].work.system, max(group.work.settings.rows for group in self.groups)
             kept = 8 * rows * len(trajectory_schema(system)) / self.sweep.keep
-            size = min(size, _TRAJECTORY_BYTES / kept)
+            size = min(size, TRAJECTORY_BYTES / kept)
         size = max(size, self.runs / (MOST_PARTS - len(self.groups)))
         return max(1, math.ceil(size / _PACKS)) * _PACKS
 
@@ -241,10 +238,10 @@ class Plan:
             return pa.int64()
         return pa.float64() if kinds <= {int, float} else pa.string()
 
-    def parameters(self, chunk: Chunk, columns: Columns) -> Floats:
-        """The kernel's parameters of each run of a chunk with the given columns, (runs, parameters)."""
-        numbers = self._numbers(chunk.group, columns)
-        return chunk.group.work.chosen(chunk.group.scenario.slots_for(numbers), chunk.runs)
+    def inputs(self, chunk: Chunk, columns: Columns) -> Inputs:
+        """What the runs of a chunk with the given columns take."""
+        runs = range(chunk.first, chunk.first + chunk.runs)
+        return chunk.group.work.inputs(chunk.group.scenario, self._numbers(chunk.group, columns), runs)
 
     def scenario_of(self, run: int) -> Scenario:
         """The scenario of one run. Raises IndexError if there is no such run."""
@@ -518,7 +515,7 @@ class Plan:
         for axis in self._free:
             probes += [self._probe(start | {axis.key: extreme}) for extreme in self._extremes(axis)]
         columns = {key: np.array([probe[key] for probe in probes]) for key in numeric} if probes else {}
-        return work_for(scenario, scenario.slots_for(columns))
+        return work_for(scenario, columns)
 
     def _extremes(self, axis: Axis) -> list[tuple[float, int]]:
         """Values that an axis takes, with their place in `values`: the ends, or all there are."""

@@ -16,15 +16,9 @@ from concurrent.futures import Executor, Future
 from importlib import import_module
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from springline.runner.files import InputError, Problem
 from springline.runner.run import Crew
-from springline.runner.sweep.work import Outcome, Work, parcel, perform, perform_parcel
-
-Floats = NDArray[np.float64]
-
+from springline.runner.sweep.work import Inputs, Outcome, Work, parcel, perform, perform_parcel
 
 _ANSWER = "10s"  # for a scheduler to answer
 
@@ -37,8 +31,8 @@ class Pool(Protocol):
         """How many chunks are simulated at a time."""
         ...
 
-    def submit(self, work: Work, parameters: Floats, kept: Sequence[int], first: int) -> Future[Outcome]:
-        """Begin a chunk, whose first run has this number."""
+    def submit(self, work: Work, inputs: Inputs, kept: Sequence[int]) -> Future[Outcome]:
+        """Begin a chunk of runs, of which those at the places `kept` give their trajectory."""
         ...
 
     def underway(self) -> int:
@@ -53,10 +47,9 @@ class Pool(Protocol):
 class Threads(Crew):
     """Threads of this process."""
 
-    def submit(self, work: Work, parameters: Floats, kept: Sequence[int], first: int) -> Future[Outcome]:
+    def submit(self, work: Work, inputs: Inputs, kept: Sequence[int]) -> Future[Outcome]:
         """Begin a chunk in a free thread."""
-        given = (work.settings, work.tables, parameters, kept)
-        return self.begin(lambda watch: perform(work.kernel(), *given, first=first, watch=watch))
+        return self.begin(lambda watch: perform(work.kernel(), work.settings, work.tables, inputs, kept, watch))
 
 
 class Cluster:
@@ -76,9 +69,9 @@ class Cluster:
             self._threads = time.monotonic(), count
         return count
 
-    def submit(self, work: Work, parameters: Floats, kept: Sequence[int], first: int) -> Future[Outcome]:
+    def submit(self, work: Work, inputs: Inputs, kept: Sequence[int]) -> Future[Outcome]:
         """Send a chunk to a worker."""
-        return self._executor.submit(perform_parcel, parcel(work), parameters, list(kept), first)
+        return self._executor.submit(perform_parcel, parcel(work), inputs, list(kept))
 
     def underway(self) -> int:
         """Nothing: workers report whole chunks."""

@@ -75,9 +75,9 @@ def run_sweep(
     in_a_row = 0
 
     def submit(chunk: Chunk, columns: Columns, attempt: int) -> None:
-        parameters, kept = plan.parameters(chunk, columns), plan.kept(chunk)
+        inputs, kept = plan.inputs(chunk, columns), plan.kept(chunk)
         try:
-            future = pool.submit(chunk.group.work, parameters, kept, chunk.first)
+            future = pool.submit(chunk.group.work, inputs, kept)
         except (OSError, RuntimeError) as error:  # the pool itself is gone: the chunk fails like any other
             future = Future()
             future.set_exception(error)

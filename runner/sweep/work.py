@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
@@ -29,9 +29,34 @@ from springline.codegen.kernel import (
 from springline.codegen.program import SignalTable, program
 from springline.model.system import System
 from springline.runner.run import kernel_structure, loop_settings
-from springline.runner.scenario import Scenario, Slots, kernel_tables, per_run
+from springline.runner.scenario import Scenario, kernel_tables, per_run
 
 Floats = NDArray[np.float64]
+
+TRAJECTORY_BYTES = 64e6
+"""Of the trajectories that a chunk gives, about."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Inputs:
+    """What runs of a Work take.
+
+    parameters  (runs, parameters), in the order of the kernel's
+    numbers     of the runs, by which noise goes
+    bands       (runs, bands), what the metrics of each take for settled; None for those of the Work's settings in all
+    """
+
+    parameters: Floats
+    numbers: Sequence[int]
+    bands: Floats | None = None
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def take(self, places: Sequence[int]) -> Inputs:
+        """Those of the runs at these places."""
+        bands = None if self.bands is None else self.bands[places]
+        return Inputs(self.parameters[places], [self.numbers[k] for k in places], bands)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +94,13 @@ class Work:
         with _COMPILING:
             return kernel(self.spec)
 
-    def chosen(self, slots: Slots, runs: int) -> Floats:
-        """What each run takes of `slots`, (runs, parameters)."""
+    def inputs(self, scenario: Scenario, columns: Mapping[str, Floats], numbers: Sequence[int]) -> Inputs:
+        """What the runs with these numbers take; `columns` as for Scenario.slots_for, which raises InputError."""
+        slots = scenario.slots_for(columns)
         for key, value in self.spec.constants.items():
             if not np.all(slots[key] == value):
                 raise AssertionError(f"{key}, which was taken for constant, varies")
-        return per_run(slots, self.parameters, runs)
+        return Inputs(per_run(slots, self.parameters, len(numbers)), numbers, scenario.bands_for(columns))
 
 
 # Several threads want the first chunk's kernel at once, and CasADi is not made for that.
@@ -94,8 +120,12 @@ def _runtime_tokens() -> dict[str, list[str]]:
     return {name: tokens(text) for name, text in runtime_sources().items()}
 
 
-def work_for(scenario: Scenario, slots: Slots) -> Work:
-    """The Work of a scenario's runs: a slot in which they differ is tunable, any other is baked."""
+def work_for(scenario: Scenario, columns: Mapping[str, Floats]) -> Work:
+    """The Work of runs with these `columns`, as for Scenario.slots_for, which raises InputError.
+
+    A slot in which they differ is tunable, any other is baked.
+    """
+    slots = scenario.slots_for(columns)
     spec = KernelSpec(
         kernel_structure(scenario),
         scenario.control_every > 0,
@@ -117,28 +147,35 @@ def perform(
     loop: Kernel,
     settings: LoopSettings,
     tables: Sequence[SignalTable],
-    parameters: Floats,
+    inputs: Inputs,
     kept: Sequence[int] = (),
     watch: Watch | None = None,
-    first: int = 0,
 ) -> Outcome:
-    """Simulate one run per row of `parameters`, in this thread; those at `kept` with their trajectory.
+    """Simulate runs in this thread; those at the places `kept` with their trajectory.
 
-    The number of a run, by which noise goes, is `first` for the first row, and one more for each other.
-
-    A kept run is simulated twice, for a trajectory slows a whole pack down; the bits are the same. `watch` counts the
-    first time and stops either.
+    Where some are kept, these are simulated twice, for a trajectory slows a whole pack down; the bits are the same.
+    `watch` counts the first time and stops either.
     """
-    numbers = range(first, first + len(parameters))
-    runs = loop.run(parameters, replace(settings, output_every=0), tables, numbers=numbers, watch=watch)
+
+    def call(given: Inputs, output_every: int, watch: Watch | None) -> Runs:
+        told = replace(settings, output_every=output_every)
+        return loop.run(given.parameters, told, tables, numbers=given.numbers, bands=given.bands, watch=watch)
+
+    if kept and len(kept) == len(inputs):
+        runs = call(inputs, settings.output_every, watch)
+        return Outcome(replace(runs, trajectory=None, rows=None), _written(runs))
+    runs = call(inputs, 0, watch)
     again = None if watch is None else Watch(stop=watch.stop)
     trajectories: list[Floats] = []
     for begin in range(0, len(kept), loop.width):
-        some = list(kept[begin : begin + loop.width])
-        pack = loop.run(parameters[some], settings, tables, numbers=[numbers[i] for i in some], watch=again)
-        assert pack.trajectory is not None and pack.rows is not None
-        trajectories += [rows[:count].copy() for rows, count in zip(pack.trajectory, pack.rows, strict=True)]
+        trajectories += _written(call(inputs.take(kept[begin : begin + loop.width]), settings.output_every, again))
     return Outcome(runs, tuple(trajectories))
+
+
+def _written(runs: Runs) -> tuple[Floats, ...]:
+    """Of each run the rows of its trajectory that were written."""
+    assert runs.trajectory is not None and runs.rows is not None
+    return tuple(rows[:count].copy() for rows, count in zip(runs.trajectory, runs.rows, strict=True))
 
 
 @dataclass(frozen=True)
@@ -163,12 +200,12 @@ def parcel(work: Work) -> Parcel:
     return Parcel(Shape.of(work.system), source, source.hash, work.settings, work.tables)
 
 
-def perform_parcel(parcel: Parcel, parameters: Floats, kept: Sequence[int] = (), first: int = 0) -> Outcome:
+def perform_parcel(parcel: Parcel, inputs: Inputs, kept: Sequence[int] = ()) -> Outcome:
     """`perform` in a worker: its kernel is compiled from the parcel's sources once, then taken from its cache.
 
     Raises ValueError if the sources are not those that were sent, ToolchainError if they cannot be compiled here.
     """
-    return perform(_received(parcel), parcel.settings, parcel.tables, parameters, kept, first=first)
+    return perform(_received(parcel), parcel.settings, parcel.tables, inputs, kept)
 
 
 _received_kernels: dict[str, Kernel] = {}

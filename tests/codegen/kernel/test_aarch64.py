@@ -17,14 +17,15 @@ DRIVER = """
 #include "loop.c"
 #include <stdio.h>
 enum { RUNS = %d };
-static double parameters[RUNS * SL_NP], metrics[RUNS * SL_NMETRICS], state[RUNS * SL_NX], end[RUNS];
+static double parameters[RUNS * SL_NP], bands[RUNS][SL_NBANDS];
+static double metrics[RUNS * SL_NMETRICS], state[RUNS * SL_NX], end[RUNS];
 static int32_t status[RUNS], quantity[RUNS];
 int main(void) {
   sl_job job = {0};
   if (fread(parameters, sizeof parameters, 1, stdin) != 1) return 1;
   job.last = RUNS, job.steps = %d, job.step = %r, job.bound = 1e6, job.hold = 1;
-  job.response_band = 0.10, job.settling_band = 0.05;
-  job.parameters = parameters, job.metrics = metrics, job.final_state = state, job.end_time = end;
+  for (int i = 0; i < RUNS; i++) bands[i][SL_RESPONSE_BAND] = 0.10, bands[i][SL_SETTLING_BAND] = 0.05;
+  job.parameters = parameters, job.bands = bands[0], job.metrics = metrics, job.final_state = state, job.end_time = end;
   job.status = status, job.quantity = quantity;
   springline_simulate(&job);
   return fwrite(state, sizeof state, 1, stdout) == 1 && fwrite(metrics, sizeof metrics, 1, stdout) == 1 ? 0 : 1;

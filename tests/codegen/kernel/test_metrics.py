@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 
-from springline.codegen.kernel import KernelOptions, KernelSpec, LoopSettings, Runs
+from springline.codegen.kernel import BANDS, KernelOptions, KernelSpec, LoopSettings, Runs
 from springline.codegen.kernel import compiled as kernel_module
 from springline.codegen.kernel import metrics as kernel_metrics
 from springline.codegen.kernel.compiled import compile_kernel
@@ -152,3 +153,23 @@ def test_a_kind_that_no_part_has_is_refused() -> None:
     for kind in ("mean", "first", "last"):
         with pytest.raises(ValueError, match=f"kind '{kind}' is of the whole run, not of part 'settled'"):
             Fold(kind, NOW.e, "settled")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_each_run_of_a_pack_has_its_own_bands(engine: str, shaken: Program, values_of: Values) -> None:
+    """Of each the metrics are those of a call with its bands for all, to the bit."""
+    bands = np.array([[0.1, 0.0, 0.05, 0.0], [0.0, 0.05, 0.5, 0.0], [0.4, 0.0, 0.0, 0.2], [0.0, 0.0, 0.0, 0.0]] * 5)
+    loop = compile_kernel(shaken, KernelSpec(shaken.system.structure, options=ENGINES[engine]))
+    values = np.tile(values_of(shaken), (len(bands), 1))
+    settings = LoopSettings(8000, 1e-4)
+    together = loop.run(values, settings, bands=bands).metrics
+    for run, own in enumerate(bands[:4]):
+        told = replace(settings, **dict(zip(BANDS, map(float, own), strict=True)))
+        alone = loop.run(values[:1], told).metrics[0]
+        for other in together[run::4]:
+            np.testing.assert_array_equal(other, alone)
+    assert len({tuple(found[0, :2]) for found in together[:4]}) == 4
+    assert np.isnan(together[3, :, :2]).all() and not np.isnan(together[:3, :, :2]).any()
+    for wrong in (bands[:1], bands[:, :3], np.full_like(bands, np.nan)):
+        with pytest.raises(ValueError, match=r"bands have shape .*, expected \(20, 4\) finite numbers"):
+            loop.run(values, settings, bands=wrong)

@@ -720,7 +720,9 @@ def test_numeric_keys_are_the_slots_and_their_shorthands() -> None:
         *(f"{key}.scale" for key in slot_keys if key.startswith("plant.")),
         *(f"base_motion.shake.{i}.{name}" for i in (0, 1) for name in ("amplitude", "omega", "phase")),
         "control.mu", "control.K_f", "control.a_max", "control.U_max", "initial.q", "initial.dq",
+        *(f"simulation.{of}_{band}" for of in ("response", "settling") for band in ("band", "error")),
     }  # fmt: skip
+    assert keys["simulation.settling_error"].unit == "m or rad" and keys["simulation.settling_band"].unit == "1"
     assert keys["control.K_f"].unit == "N s/m or N m s/rad" and keys["control.delta"].unit == "m or rad"
     assert keys["plant.m3"].unit == "kg" and str(keys["plant.m3"].bounds) == "a number > 0"
     assert "initial.q_motor.0" in scenario.with_overrides({"initial.q_motor": [0, 0]}).numeric_keys()

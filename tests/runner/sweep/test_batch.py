@@ -224,18 +224,18 @@ def test_a_kept_run_that_stopped_ends_where_it_stopped(tmp_path: Path) -> None:
 def test_a_parcel_is_compiled_from_its_sources_and_checked(sweep: Path) -> None:
     plan = Plan(load_sweep(sweep))
     chunk = plan.chunk(0)
-    work, parameters = chunk.group.work, plan.parameters(chunk, plan.columns(chunk))
+    work, inputs = chunk.group.work, plan.inputs(chunk, plan.columns(chunk))
     sent = parcel(work)
     with open_pool(1) as threads:
-        here = threads.submit(work, parameters, [3], 0).result()
-    there = perform_parcel(sent, parameters, [3])
+        here = threads.submit(work, inputs, [3]).result()
+    there = perform_parcel(sent, inputs, [3])
     assert np.array_equal(here.runs.final_state, there.runs.final_state)
     assert np.array_equal(here.runs.metrics, there.runs.metrics, equal_nan=True)
     assert np.array_equal(here.trajectories[0], there.trajectories[0])
     files = tuple((name, text.replace("0.5", "0.25")) for name, text in sent.source.files)
     damaged = replace(sent, source=replace(sent.source, files=files))
     with pytest.raises(ValueError, match="damaged on the way"):
-        perform_parcel(damaged, parameters)
+        perform_parcel(damaged, inputs)
 
 
 @pytest.fixture
@@ -304,15 +304,15 @@ class _Failing:
         self._sound: list[Future[Any]] = []
         self.threads = 1
 
-    def submit(self, work: Any, parameters: Any, kept: Any, first: Any) -> Future[Any]:
-        chunk = float(parameters[0, 0])
+    def submit(self, work: Any, inputs: Any, kept: Any) -> Future[Any]:
+        chunk = float(inputs.parameters[0, 0])
         if self._failures.get(chunk, 0) > 0:
             self._failures[chunk] -= 1
             wait(self._sound)  # chunks end in the order of their submission, so that a test can count them
             future: Future[Any] = Future()
             future.set_exception(BrokenProcessPool("a worker died"))
             return future
-        self._sound.append(self._threads.submit(work, parameters, kept, first))
+        self._sound.append(self._threads.submit(work, inputs, kept))
         return self._sound[-1]
 
     def underway(self) -> int:
@@ -324,7 +324,8 @@ class _Failing:
 
 def _failing(sweep: Path, times: dict[int, int]) -> _Failing:
     plan = Plan(load_sweep(sweep), 32)
-    first = {k: float(plan.parameters(plan.chunk(k), plan.columns(plan.chunk(k)))[0, 0]) for k in times}
+    chunks = {k: plan.chunk(k) for k in times}
+    first = {k: float(plan.inputs(chunk, plan.columns(chunk)).parameters[0, 0]) for k, chunk in chunks.items()}
     return _Failing({first[k]: n for k, n in times.items()})
 
 

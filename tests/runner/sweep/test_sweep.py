@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import special, stats
 
+from springline.runner import simulate
 from springline.runner.files import InputError
 from springline.runner.scenario import packaged_sweeps
-from springline.runner.sweep import Plan, load_sweep, sampling
+from springline.runner.sweep import Plan, load_sweep, open_pool, sampling
 from springline.runner.sweep.plan import MOST_GROUPS
 from springline.runner.sweep.sweep_file import sweep_from_json
 
@@ -192,7 +193,7 @@ def test_scenario_of_a_run_has_the_numbers_of_its_row(write: Write) -> None:
         chunk = plan.chunk_of(run)
         scenario, work = plan.scenario_of(run), chunk.group.work
         keys = [slot.key for slot in work.system.slots]
-        row = plan.parameters(chunk, plan.columns(chunk))[run - chunk.first]
+        row = plan.inputs(chunk, plan.columns(chunk)).parameters[run - chunk.first]
         assert np.array_equal(scenario.values()[[keys.index(key) for key in work.parameters]], row)
         assert scenario.structure().law == ("power" if run < 100 else "double_power")
     with pytest.raises(IndexError):
@@ -482,3 +483,25 @@ def test_a_wrong_scenario_is_named_with_the_sweep_that_asks_for_it(tmp_path: Pat
     path.write_text('scenario = "paper/nominl"\nsamples = 4\n[vary]\n"control.delta" = { uniform = [0.03, 0.05] }\n')
     with pytest.raises(InputError, match=r"sweep\.toml: scenario: .*paper/nominal"):
         load_sweep(path)
+
+
+def test_bands_of_metrics_vary_within_a_group(write: Write) -> None:
+    """They move nothing of a run, so that no other kernel is needed; an error takes the place of the band."""
+    vary = "simulation.settling_error = { uniform = [0.01, 0.3] }\nsimulation.response_band = { values = [0.1, 0.4] }"
+    plan = plan_of(write(vary, "samples = 8\n[set]\nsimulation.duration = 1.5\nsimulation.response_error = 0.1"))
+    (group,) = plan.groups
+    assert group.work.parameters == ()
+    chunk = plan.chunk(0)
+    inputs = plan.inputs(chunk, plan.columns(chunk))
+    with open_pool(1) as pool:
+        table = plan.table(chunk, plan.columns(chunk), pool.submit(group.work, inputs, []).result())
+    assert [field.metadata[b"unit"] for field in plan.key_fields] == [b"m or rad", b"1"]
+    for run in range(8):
+        expected = simulate(plan.scenario_of(run)).metrics.to_pylist()[0]
+        assert {name: table[name][run].as_py() for name in expected} == expected
+    assert len(set(table["settling_time_lift"].to_pylist())) == 8
+    both = "simulation.settling_error = { values = [0.1] }\nsimulation.settling_band = { values = [0.1] }"
+    with pytest.raises(
+        InputError, match=r"vary\.simulation\.settling_error: does not go with simulation\.settling_band"
+    ):
+        plan_of(write(both))

@@ -11,7 +11,7 @@ from springline.codegen.kernel import ONE_RUN, KernelSpec, LoopSettings, Watch, 
 from springline.model.structure import Structure
 from springline.model.system import System
 from springline.runner.sweep import Plan, load_sweep
-from springline.runner.sweep.work import parcel, perform, perform_parcel
+from springline.runner.sweep.work import Inputs, parcel, perform, perform_parcel
 
 FILES = {
     "law.py": """
@@ -31,12 +31,12 @@ class Smooth(Law):
 
 def test_kept_runs_are_stopped_too_and_counted_once() -> None:
     loop = kernel(KernelSpec(Structure(), options=ONE_RUN))
-    values = np.array([[slot.default for slot in System().slots]] * 4)
+    inputs = Inputs(np.array([[slot.default for slot in System().slots]] * 4), range(4))
     watch = Watch()
-    perform(loop, LoopSettings(5000, 1e-5, output_every=500), (), values, [0, 2], watch)
+    perform(loop, LoopSettings(5000, 1e-5, output_every=500), (), inputs, [0, 2], watch)
     assert watch.progress.value == 4 * 5000
     watch.stop.value = 1
-    stopped = perform(loop, LoopSettings(1_000_000_000, 1e-5, output_every=100_000_000), (), values, [0, 2], watch)
+    stopped = perform(loop, LoopSettings(1_000_000_000, 1e-5, output_every=100_000_000), (), inputs, [0, 2], watch)
     assert [len(rows) < 5 for rows in stopped.trajectories] == [True, True]
 
 
@@ -46,7 +46,7 @@ def test_workers_need_no_file(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
     plan = Plan(load_sweep(tmp_path / "sweep.toml"))
     chunk = plan.chunk(0)
-    sent = parcel(chunk.group.work), plan.parameters(chunk, plan.columns(chunk))
+    sent = parcel(chunk.group.work), plan.inputs(chunk, plan.columns(chunk))
     (tmp_path / "parcel").write_bytes(pickle.dumps(sent))
     here = perform_parcel(*sent).runs.metrics
     for name in FILES:
