@@ -170,6 +170,12 @@ def test_each_run_of_a_pack_has_its_own_bands(engine: str, shaken: Program, valu
             np.testing.assert_array_equal(other, alone)
     assert len({tuple(found[0, :2]) for found in together[:4]}) == 4
     assert np.isnan(together[3, :, :2]).all() and not np.isnan(together[:3, :, :2]).any()
+    start = loop.run(values[:1], LoopSettings(0, 1e-4, output_every=1)).trajectory
+    assert start is not None
+    columns = [entry.name for entry in shaken.system.trajectory]
+    there = {f"initial.q.{j}": start[0, 0, columns.index(f"q1d_{joint}")] for j, joint in enumerate(JOINTS)}
+    found = loop.run(np.tile(values_of(shaken, there), (8, 1)), LoopSettings(0, 1e-4), bands=bands[:8]).metrics
+    np.testing.assert_array_equal(np.isnan(found[:, 0, 0]), [True, False, True, True] * 2)  # of no error no band is any
     for wrong in (bands[:1], bands[:, :3], np.full_like(bands, np.nan)):
         with pytest.raises(ValueError, match=r"bands have shape .*, expected \(20, 4\) finite numbers"):
             loop.run(values, settings, bands=wrong)
