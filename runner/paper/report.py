@@ -255,6 +255,8 @@ _SETS: Mapping[str, str] = {
     "motor_limit": "the limit on the motors' force",
 }
 """Sets of INPUTS, in words."""
+_LIMITED: Mapping[str, str] = {"law_limit": "law limited", "motor_limit": "motors limited"}
+"""The same for headings of columns."""
 
 
 def _both(study: Study) -> list[Block]:
@@ -268,8 +270,31 @@ def _both(study: Study) -> list[Block]:
         _prose(f"""The paper states no limit, and must have had one. This report reads it as
         {_SETS[study.inputs]}: {ours} of group 2's 24 numbers lie within 30 %. Read as {_SETS[other]}, with the other
         inputs chosen by a search for the most (`springline reproduce --inputs {other}`), {theirs} do, with one set of
-        inputs for all three laws.""")
+        inputs for all three laws."""),
+        _side_by_side(study, other),
     ]
+
+
+def _side_by_side(study: Study, other: str) -> Table:
+    """Group 2's numbers as printed, and under both sets of inputs."""
+    sets = (study.evidence.runs, study.beside[other])
+    over = [("", 2)] + [(joint, 1 + len(sets)) for joint in JOINTS]
+    columns = ["law", "", *(("paper", *(_LIMITED[name] for name in (study.inputs, other))) * len(JOINTS))]
+    rows: list[list[str]] = []
+    shades: dict[tuple[int, int], str] = {}
+    for case in cases([2]):
+        for measure in MEASURES:
+            cells = [case.name, f"{_SHORT_NAMES[measure]} [{'s' if measure in TIMES else 'm, rad'}]"]
+            for i, joint in enumerate(JOINTS):
+                cells.append(_printed(case, measure, i))
+                for runs in sets:
+                    ours = runs[case.scenario].metric(measure, joint)
+                    if case.printed:
+                        band = closeness(measure, case.printed[measure][i], ours)
+                        shades[len(rows), len(cells)] = _SHADES.get(band, "")
+                    cells.append(_time(ours) if measure in TIMES else number(ours))
+            rows.append(cells)
+    return Table(columns, rows, "Group 2 under both readings of the limit", labels=2, shades=shades, over=over)
 
 
 def _reasons(study: Study) -> list[str]:
