@@ -11,7 +11,6 @@ from .packaged import packaged_scenarios as packaged_scenarios
 from .packaged import packaged_sweeps as packaged_sweeps
 from .packaged import scenarios_folder as scenarios_folder
 from .scenario import Scenario as Scenario
-from .scenario import Slots as Slots
 from .scenario import absent_at as absent_at
 from .scenario import draft_scenario as draft_scenario
 from .scenario import expect_scenario as expect_scenario
