@@ -40,13 +40,71 @@ class Boundary:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class LinearLoop:
-    """Plant and control at some times for some runs; all arrays are (runs, times, ...), SI units.
+class Points:
+    """Where loops of any amplitude are linearised, and the plant there; all arrays are (runs, times, ...), SI units.
 
-    amplitude  of sigma, (n,) or (runs, n), for which the gains hold
     times      s;  values: parameter vectors, (runs, slots)
     x, u, z    operating points: on the reference, with the motors and the forces that carry it
     A, B       of the plant: dx = A x + B u
+    """
+
+    scenario: Scenario
+    times: Floats
+    values: Floats
+    x: Floats
+    u: Floats
+    z: Floats
+    A: Floats
+    B: Floats
+
+    def loop(self, amplitude: ArrayLike) -> LinearLoop:
+        """The loop there; amplitude: one number, one a joint, or (runs, joints)."""
+        sizes = np.asarray(amplitude, float)
+        sizes = np.broadcast_to(sizes, np.broadcast_shapes(sizes.shape, self.u.shape[-1:]))
+        control = _control(self, sizes, 0.0)
+        lags = slots_of(self.scenario, "actuator.lag")
+        lag = self.values[:, lags] if lags else np.zeros((len(self.values), self.u.shape[-1]))
+        reach = control["u_s"]
+        return LinearLoop(
+            self.scenario, self.times, self.values, self.x, self.u, self.z, self.A, self.B, sizes,
+            control["u_x"], control["u_z"], control["dz_x"], control["dz_z"], control["sigma_x"], control["sigma_z"],
+            reach, _law_gain(self.scenario, self.values, self.x, reach), lag,
+        )  # fmt: skip
+
+    def with_control(self, key: str, numbers: Floats) -> Points:
+        """Of one run, as many as there are numbers: each for a parameter of the control."""
+        place = [slot.key for slot in linearised(self.scenario).system.slots].index(key)
+        values = np.repeat(self.values, len(numbers), axis=0)
+        values[:, place] = numbers
+        x, u, a, b = (np.repeat(item, len(numbers), axis=0) for item in (self.x, self.u, self.A, self.B))
+        z = _states_of_control(self.scenario, values, self.times, x, u)
+        return Points(self.scenario, self.times, values, x, u, z, a, b)
+
+    def repeated(self, runs: int) -> Points:
+        """Of one run, as many alike."""
+        values, x, u, z, a, b = (np.repeat(item, runs, axis=0) for item in self._arrays)
+        return Points(self.scenario, self.times, values, x, u, z, a, b)
+
+    def at_time(self, place: int) -> Points:
+        """At one of the times."""
+        x, u, z, a, b = (item[:, place : place + 1] for item in self._arrays[1:])
+        return Points(self.scenario, self.times[place : place + 1], self.values, x, u, z, a, b)
+
+    def of_run(self, run: int) -> Points:
+        """One of the runs."""
+        values, x, u, z, a, b = (item[run : run + 1] for item in self._arrays)
+        return Points(self.scenario, self.times, values, x, u, z, a, b)
+
+    @property
+    def _arrays(self) -> tuple[Floats, ...]:
+        return self.values, self.x, self.u, self.z, self.A, self.B
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LinearLoop(Points):
+    """Points with the control there; its arrays are (runs, times, ...) too.
+
+    amplitude  of sigma, (n,) or (runs, n), for which the gains hold
     Cx, Cz     of the control: u = Cx x + Cz z, a law by its equivalent gain
     Dx, Dz     of its states where it is continuous: dz = Dx x + Dz z
     Sx, Sz     of the sliding variable: sigma = Sx x + Sz z; zero without one
@@ -56,15 +114,7 @@ class LinearLoop:
     lag        time constants of the motors' forces, (runs, n), s
     """
 
-    scenario: Scenario
     amplitude: Floats
-    times: Floats
-    values: Floats
-    x: Floats
-    u: Floats
-    z: Floats
-    A: Floats
-    B: Floats
     Cx: Floats
     Cz: Floats
     Dx: Floats
@@ -116,8 +166,7 @@ class LinearLoop:
         """
         if not linearised(self.scenario).held and (not self.z.shape[-1] or linearised(self.scenario).euler):
             return self.Cx, self.Cz, period * self.Dx, np.eye(self.z.shape[-1]) + period * self.Dz
-        points = Points(self.scenario, self.times, self.values, self.x, self.u, self.z, self.A, self.B)
-        found = _control(points, self.amplitude, period)
+        found = _control(self, self.amplitude, period)
         return found["u_x"], found["u_z"], found["ahead_x"], found["ahead_z"]
 
 
@@ -151,62 +200,6 @@ def linear_loop(
     cut at its sigma.
     """
     return points_of(scenario, times=times, columns=columns, values=values).loop(amplitude)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Points:
-    """Where loops of any amplitude are linearised, and the plant there: as of a LinearLoop, (runs, times, ...)."""
-
-    scenario: Scenario
-    times: Floats
-    values: Floats
-    x: Floats
-    u: Floats
-    z: Floats
-    A: Floats
-    B: Floats
-
-    def loop(self, amplitude: ArrayLike) -> LinearLoop:
-        """The loop there; amplitude: one number, one a joint, or (runs, joints)."""
-        sizes = np.asarray(amplitude, float)
-        sizes = np.broadcast_to(sizes, np.broadcast_shapes(sizes.shape, self.u.shape[-1:]))
-        control = _control(self, sizes, 0.0)
-        lags = slots_of(self.scenario, "actuator.lag")
-        lag = self.values[:, lags] if lags else np.zeros((len(self.values), self.u.shape[-1]))
-        reach = control["u_s"]
-        return LinearLoop(
-            self.scenario, sizes, self.times, self.values, self.x, self.u, self.z, self.A, self.B,
-            control["u_x"], control["u_z"], control["dz_x"], control["dz_z"], control["sigma_x"], control["sigma_z"],
-            reach, _law_gain(self.scenario, self.values, self.x, reach), lag,
-        )  # fmt: skip
-
-    def with_control(self, key: str, numbers: Floats) -> Points:
-        """Of one run, as many as there are numbers: each for a parameter of the control."""
-        place = [slot.key for slot in linearised(self.scenario).system.slots].index(key)
-        values = np.repeat(self.values, len(numbers), axis=0)
-        values[:, place] = numbers
-        x, u, a, b = (np.repeat(item, len(numbers), axis=0) for item in (self.x, self.u, self.A, self.B))
-        z = _states_of_control(self.scenario, values, self.times, x, u)
-        return Points(self.scenario, self.times, values, x, u, z, a, b)
-
-    def repeated(self, runs: int) -> Points:
-        """Of one run, as many alike."""
-        values, x, u, z, a, b = (np.repeat(item, runs, axis=0) for item in self._arrays)
-        return Points(self.scenario, self.times, values, x, u, z, a, b)
-
-    def at_time(self, place: int) -> Points:
-        """At one of the times."""
-        x, u, z, a, b = (item[:, place : place + 1] for item in self._arrays[1:])
-        return Points(self.scenario, self.times[place : place + 1], self.values, x, u, z, a, b)
-
-    def of_run(self, run: int) -> Points:
-        """One of the runs."""
-        values, x, u, z, a, b = (item[run : run + 1] for item in self._arrays)
-        return Points(self.scenario, self.times, values, x, u, z, a, b)
-
-    @property
-    def _arrays(self) -> tuple[Floats, ...]:
-        return self.values, self.x, self.u, self.z, self.A, self.B
 
 
 def points_of(
