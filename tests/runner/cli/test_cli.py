@@ -473,6 +473,15 @@ def test_json_is_the_same_text_for_programs_and_safe_to_look_at(capsys: pytest.C
     assert terminal.printable(shown) == shown
 
 
+def test_what_is_said_is_written_as_it_is(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not folded, no mark-up, no :names: of pictures: keys and paths look like that."""
+    monkeypatch.setenv("COLUMNS", "20")
+    text = "[bold]a/:smile:/b[/bold]\tand words beyond twenty columns "
+    terminal.say(text)
+    terminal.complain(text)
+    assert capsys.readouterr() == (f"{text}\n", f"{text}\n")
+
+
 def shown_in(width: int, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> str:
     monkeypatch.setenv("COLUMNS", str(width))
     result = springline(*arguments)
@@ -981,18 +990,6 @@ def test_version_and_help() -> None:
     assert done("--version") == f"springline {__version__}\n"
     shown = done("--help")
     assert all(f"  {command} " in shown for command in ("run", "generate", "export", "reproduce", "list", "doctor"))
-
-
-def test_version_and_help_wait_for_no_library() -> None:
-    """CasADi, Arrow and Matplotlib take seconds to import; Rich is more than the help needs."""
-    code = (
-        "import sys; from springline.runner.cli import app\n"
-        "try: app(['--help'])\n"
-        "except SystemExit: pass\n"
-        "print(sorted({'casadi', 'matplotlib', 'pyarrow', 'scipy', 'pydantic', 'rich'} & set(sys.modules)))"
-    )
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert shown.splitlines()[-1] == "[]"
 
 
 def test_a_run_without_figures_waits_for_no_library_that_it_does_not_use(elsewhere: Path) -> None:
