@@ -13,12 +13,13 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
+
+from springline.benchmarks.processes import run_to_end
 
 # Only the standard library: what this process holds when it starts another counts to the other's peak.
 
@@ -64,13 +65,7 @@ class Peak(NamedTuple):
 
 def peak_mb(*words: str) -> float:
     """Peak resident memory of a Python process, MB. Raises RuntimeError if it fails."""
-    with tempfile.TemporaryFile("w+") as output:
-        child = subprocess.Popen([sys.executable, *words], stdout=output, stderr=subprocess.STDOUT)
-        _, status, usage = os.wait4(child.pid, 0)
-        child.returncode = os.waitstatus_to_exitcode(status)
-        output.seek(0)
-        if child.returncode:
-            raise RuntimeError(f"exit code {child.returncode} of {' '.join(words)}:\n{output.read()}")
+    usage = run_to_end([sys.executable, *words]).usage
     return usage.ru_maxrss * _UNIT / 1e6
 
 

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from functools import cache
 from typing import ClassVar
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.base import ALIASES, COORDINATES, MOTION_ORDER
 from springline.model.declared import column, expect_names, expect_parameters, expect_text, snake_case, symbols_of
 from springline.model.parameters import Parameter, ParameterVector, Values
 from springline.model.registry import Registry
-from springline.model.signals import CONSTANT_ZERO, Signal
+from springline.model.signals import Signal, constant_zero
 
 RESERVED = ("kind", "mount", "mount_rpy", *(c.key for c in COORDINATES), *ALIASES)
 """Keys of [base_motion] that no parameter of such a class may be called."""
@@ -45,7 +44,7 @@ class BaseMotion(ABC):
 
 
 def signals_of(motion: BaseMotion, t: ca.SX, p: Values) -> dict[str, Signal]:
-    """The motion by the coordinates' keys; one that is exactly zero is CONSTANT_ZERO.
+    """The motion by the coordinates' keys; one that is exactly zero is constant_zero().
 
     Raises ValueError, with the class's name, for what are no six scalar expressions of t and p.
     """
@@ -62,7 +61,7 @@ def signals_of(motion: BaseMotion, t: ca.SX, p: Values) -> dict[str, Signal]:
     for key, item in zip(MOTION_ORDER, given, strict=True):
         value = column(owner, f"motion, {key}", item, 1, known)
         rate = ca.gradient(value, t)
-        result[key] = CONSTANT_ZERO if value.is_zero() else Signal(value, rate, ca.gradient(rate, t))
+        result[key] = constant_zero() if value.is_zero() else Signal(value, rate, ca.gradient(rate, t))
     return result
 
 
@@ -71,7 +70,7 @@ def moving_terms(motion: BaseMotion) -> tuple[int, ...]:
     """1 for each of COORDINATES that moves, else 0. Raises ValueError as `signals_of` does."""
     p = ParameterVector().table("base_motion", motion.parameters, ())
     found = signals_of(motion, ca.SX.sym("t"), p)
-    return tuple(int(found[c.key] is not CONSTANT_ZERO) for c in COORDINATES)
+    return tuple(int(found[c.key] is not constant_zero()) for c in COORDINATES)
 
 
 def check_motion(motion: BaseMotion) -> None:

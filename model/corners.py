@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from springline.model import lazy_casadi as ca
 from springline.model.base_motion import BaseMotion, signals_of
 from springline.model.parameters import ParameterVector
-from springline.model.signals import CONSTANT_ZERO
+from springline.model.signals import constant_zero
 from springline.model.symbolic import derivation, over_runs
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ def corners(motion: BaseMotion, given: Mapping[str, float], duration: float) -> 
     moving = {
         key: signal
         for key, signal in signals_of(motion, t, vector.table("base_motion", motion.parameters, ())).items()
-        if signal is not CONSTANT_ZERO
+        if signal is not constant_zero()
     }
     switches = _switches(ca.vertcat(*(signal.value for signal in moving.values())), t, vector.sx) if moving else []
     if not switches:

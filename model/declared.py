@@ -11,8 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence, Set
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.parameters import Joint, Parameter
 
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

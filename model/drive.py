@@ -21,8 +21,7 @@ from functools import reduce
 from operator import add
 from typing import Literal, Protocol
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.dynamics import EquationsOfMotion
 from springline.model.mechanisms import Mechanism
 from springline.model.parameters import NON_NEGATIVE, POSITIVE, Bounds, Parameter, Values

@@ -25,13 +25,12 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar, Literal
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.integrators import Number
 from springline.model.parameters import LIMIT, NON_NEGATIVE, Parameter, Values
 from springline.model.quantities import DQ1, DQ2, Q1, Q2, Quantity
 
-Measured = Mapping[Quantity, ca.SX]
+Measured = Mapping[Quantity, "ca.SX"]
 
 POSITIONS, RATES = (Q1, Q2), (DQ1, DQ2)
 

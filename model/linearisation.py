@@ -14,8 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.structure import Structure
 from springline.model.symbolic import as_written, derivation, derived_property, replaced_values
 from springline.model.system import System, system_of

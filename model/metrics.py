@@ -11,8 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.quantities import Quantity
 
 Kind = Literal["largest", "smallest", "integral", "mean", "variation", "first", "last"]

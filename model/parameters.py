@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import casadi as ca
+from springline.model import lazy_casadi as ca
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ class Slot:
     bounds: Bounds
 
 
-class Values(Mapping[str, ca.SX]):
+class Values(Mapping[str, "ca.SX"]):
     """Symbols of one table of parameters, by name or as attributes: scalars, or n x 1 columns (per joint)."""
 
     def __init__(self, symbols: Mapping[str, ca.SX]) -> None:

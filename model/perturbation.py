@@ -5,8 +5,7 @@ epsilon in (0, 1], K1 = epsilon^2 K, spring force z = K (q2 - q1), eta = z - zba
 
 from __future__ import annotations
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.dynamics import EquationsOfMotion
 from springline.model.symbolic import over, solve_spd
 

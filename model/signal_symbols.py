@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Literal
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model import signals as formulas
 from springline.model.base import COORDINATES, moving
 from springline.model.base_motion import MOTIONS, signals_of
 from springline.model.parameters import Joint, ParameterVector
-from springline.model.signals import CONSTANT_ZERO, Signal
+from springline.model.signals import Signal, constant_zero
 from springline.model.structure import SignalShape, TableLayout
 
 SignalTableName = Literal["reference", "base_motion", "disturbance"]
@@ -46,7 +45,7 @@ class SignalSymbols:
     ) -> list[Signal]:
         """Expressions of one vector signal; appends its parameters to the vector or its data to d."""
         if shape.kind in ("none", "input"):
-            return [CONSTANT_ZERO] * len(coordinates)
+            return [constant_zero()] * len(coordinates)
         if shape.kind == "table":
             return self._table(table, shape, [key for key, _ in coordinates])
         one = self._via_points if shape.kind == "polynomial" else self._sines
@@ -70,7 +69,7 @@ class SignalSymbols:
         self.tables += (TableLayout(table, start, channels),)
         blocks = {i: ca.SX.sym(f"{table}_{coordinates[i]}", 4) for i in channels}
         self._data += [tau, *blocks.values()]
-        return [formulas.cubic(tau, blocks[i]) if i in blocks else CONSTANT_ZERO for i in range(len(coordinates))]
+        return [formulas.cubic(tau, blocks[i]) if i in blocks else constant_zero() for i in range(len(coordinates))]
 
     def _via_points(self, table: str, key: str, unit: str, count: int) -> Signal:
         def points(name: str, unit: str, meaning: str) -> list[ca.SX]:

@@ -7,12 +7,12 @@ the caller supplies per step; the polynomial itself, and every derivative, is wr
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.symbolic import solve_spd
 
 
@@ -34,7 +34,10 @@ class Signal:
     acceleration: ca.SX
 
 
-CONSTANT_ZERO = Signal(ca.SX(0), ca.SX(0), ca.SX(0))
+@functools.cache
+def constant_zero() -> Signal:
+    """What is zero all the time; it is one and the same, by which it is known."""
+    return Signal(ca.SX(0), ca.SX(0), ca.SX(0))
 
 
 def sine_sum(t: ca.SX, offset: ca.SX, terms: Sequence[tuple[ca.SX, ca.SX, ca.SX]]) -> Signal:
@@ -94,7 +97,7 @@ def via_points(t: ca.SX, times: Sequence[ca.SX], values: Sequence[ca.SX]) -> Sig
     )
 
 
-_Point = tuple[ca.SX, ca.SX, ca.SX]
+_Point = tuple["ca.SX", "ca.SX", "ca.SX"]
 
 
 def _quintic(span: ca.SX, start: _Point, end: _Point) -> list[ca.SX]:

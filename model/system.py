@@ -14,10 +14,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from springline.model import lazy_casadi as ca
 from springline.model import perturbation, signals
 from springline.model.base import MOUNT, MOUNT_RPY, BaseState
 from springline.model.control import (

@@ -15,8 +15,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.declared import expect_names, expect_text
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.base import BaseState
 
 

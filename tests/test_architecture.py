@@ -27,7 +27,7 @@ LAYERS = {
                "runner.analysis", "runner.paper", "runner.cli"),
 }  # fmt: skip
 STRANGERS = {
-    "model": {"casadi", "numpy", "lazy_loader"},
+    "model": {"numpy", "lazy_loader"},  # CasADi comes from lazy_casadi.py, for lists of laws do not wait for it
     "codegen": {"casadi", "jinja2", "numpy", "lazy_loader"},
 }
 """What is not of the standard library and may be imported, where that is not everything."""

@@ -12,7 +12,6 @@ import errno
 import fcntl
 import os
 import re
-import secrets
 import shutil
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path, PurePosixPath
@@ -111,7 +110,7 @@ def workplace(folder: Path) -> Iterator[Path]:
 
 def _temporary(folder: Path) -> Path:
     """A new name in `folder`. Beside the target, for only there is a rename sure to stay in one file system."""
-    return folder / f"{TEMPORARY}{secrets.token_hex(8)}"
+    return folder / f"{TEMPORARY}{os.urandom(8).hex()}"
 
 
 def _move(folder: Path, path: str, prepared: Path | None, replaced: Path, undo: contextlib.ExitStack) -> None:

@@ -57,7 +57,7 @@ class Program:
 
     def size(self, name: str) -> int:
         """Number of entries of a vector of the loop: t, d, p, r, w, s, x, z, u, e, noise, measured."""
-        sizes = {
+        sizes: dict[str, int] = {
             "p": self.system.p.numel(),
             "d": self.system.d.numel(),
             "w": self.system.w.numel(),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.control.controller import ArmModel, ArmTerms, Control, Rates
 from springline.model.control.sliding import TINY
 from springline.model.parameters import LIMIT, NON_NEGATIVE, Parameter, Values

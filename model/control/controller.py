@@ -19,8 +19,7 @@ from functools import reduce
 from operator import add
 from typing import ClassVar
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.control.reaching import Law
 from springline.model.control.sliding import SurfaceExponents
 from springline.model.declared import (
@@ -38,8 +37,8 @@ from springline.model.perturbation import slow_mass
 from springline.model.quantities import SIGMA, U_WISHED, Quantity
 from springline.model.terms import named, section
 
-States = Mapping[str, ca.SX]
-Rates = States | Callable[[ca.SX], States]
+States = Mapping[str, "ca.SX"]
+Rates = States | Callable[["ca.SX"], States]
 """One expression per state, by name; or what gives them, called with the command that U_max let through."""
 
 

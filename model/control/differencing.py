@@ -16,8 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.control.controller import states_of
 from springline.model.parameters import LIMIT, Joint, Parameter
 from springline.model.quantities import DERIVATIVES, Q1, Q2, Quantity

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.control.controller import ArmModel
 from springline.model.control.observer import Estimate, NoObserver, Observer, ObserverInput, check_observer
 from springline.model.parameters import POSITIVE, Parameter, Values

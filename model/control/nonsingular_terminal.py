@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.control.common import composite, slow_control, softened, tracking_error
 from springline.model.control.controller import ArmModel, Condition, Control, Controller
 from springline.model.control.sliding import TINY

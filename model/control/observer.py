@@ -13,8 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.control.controller import ArmModel, Checked, Condition, check_states, states_of
 from springline.model.declared import column, expect_names, expect_parameters, expect_text, snake_case, symbols_of
 from springline.model.parameters import Joint, Parameter, Values
@@ -22,7 +21,7 @@ from springline.model.quantities import Quantity
 from springline.model.terms import noted
 
 ObserverInput = Literal["command", "spring"]
-Estimate = tuple[ca.SX, Mapping[str, ca.SX]]
+Estimate = tuple["ca.SX", Mapping[str, "ca.SX"]]
 """The disturbance d, n x 1, and the rates of the observer's states by name."""
 
 INPUT = "input"

@@ -9,8 +9,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.control.sliding import TINY
 from springline.model.declared import column, expect_names, expect_parameters, expect_text, snake_case, symbols_of
 from springline.model.parameters import EVEN, LIMIT, POSITIVE, UNIT_OPEN, Bounds, Parameter, Values

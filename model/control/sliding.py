@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.parameters import NON_NEGATIVE, POSITIVE, Parameter, Values
 from springline.model.terms import named, of_joint
 

@@ -18,8 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.base import BaseState
 from springline.model.dynamics import newton_euler, rigid_bodies
 from springline.model.dynamics.lagrange import energies_of

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.declared import column, symbols_of
 from springline.model.mechanisms import Mechanism
 from springline.model.parameters import Values

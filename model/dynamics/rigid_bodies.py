@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.mechanisms import Solid, turning
 
 

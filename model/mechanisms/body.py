@@ -6,8 +6,7 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.declared import column
 
 

@@ -7,8 +7,7 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.declared import column
 from springline.model.mechanisms.body import Solid, inertia_matrix, stacked
 

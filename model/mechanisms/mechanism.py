@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.declared import (
     expect_names,
     expect_numbers,

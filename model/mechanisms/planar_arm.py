@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import ClassVar
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.mechanisms.link import Link
 from springline.model.mechanisms.mechanism import Mechanism
 from springline.model.parameters import NON_NEGATIVE, POSITIVE, Joint, Parameter, Values

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from springline.model import lazy_casadi as ca
 from springline.model.mechanisms.mechanism import Mechanism
 from springline.model.parameters import Values
 from springline.model.symbolic import over_runs

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.mechanisms.mechanism import Mechanism
 from springline.model.parameters import POSITIVE, REAL, Joint, Parameter, Values
 from springline.model.signals import SineTerm

@@ -15,8 +15,7 @@ import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.symbolic.derivation import as_written
 from springline.model.symbolic.values import Value, listed, stacked, unstacked, written
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import casadi as ca
-
-_FREE = frozenset({ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST, ca.OP_PARAMETER})
+from springline.model import lazy_casadi as ca
 
 
 def operations(expression: ca.SX, symbols: ca.SX, changing: ca.SX) -> int:
@@ -26,5 +24,5 @@ def operations(expression: ca.SX, symbols: ca.SX, changing: ca.SX) -> int:
             varies[into[0]] = False
         elif op != ca.OP_OUTPUT:
             varies[into[0]] = any(varies[i] for i in source)
-            count += varies[into[0]] and op not in _FREE
+            count += varies[into[0]] and op != ca.OP_PARAMETER
     return count

@@ -8,7 +8,7 @@ from functools import cached_property, wraps
 from threading import RLock
 from typing import Any, ParamSpec, Self, TypeVar, overload
 
-import casadi as ca
+from springline.model import lazy_casadi as ca
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import casadi as ca
+from springline.model import lazy_casadi as ca
 
 # A monomial is a sorted tuple of (atom index, power), a polynomial maps monomials to coefficients.
 Monomial = tuple[tuple[int, int], ...]

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+
+from springline.model import lazy_casadi as ca
 
 Floats = NDArray[np.float64]
 

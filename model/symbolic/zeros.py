@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import casadi as ca
-
+from springline.model import lazy_casadi as ca
 from springline.model.symbolic.derivation import as_written
 from springline.model.symbolic.values import listed, stacked, unstacked, written
 

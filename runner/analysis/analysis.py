@@ -24,7 +24,7 @@ from springline.runner.analysis.proof import Proof, proof_of, proof_reaches
 from springline.runner.analysis.reaching import AMPLITUDES
 from springline.runner.analysis.sampled import period_max, rates_of
 from springline.runner.analysis.timing import unbounded_gain
-from springline.runner.files import InputError, Problem
+from springline.runner.files import InputError, Problem, numpy_array
 from springline.runner.run import Progress, simulate
 from springline.runner.scenario import Scenario, expect_scenario, given_text
 
@@ -224,11 +224,7 @@ class _Work:
         result = simulate(self.scenario.with_overrides({"simulation.output_every": every}))
         if result.status != "ok":
             return None, f"the run does not last, so that no disturbance can be told ({result.message})"
-        # Arrow's own to_numpy imports pandas where that is installed.
-        columns = {
-            name: np.asarray(np.from_dlpack(column.chunk(0)), dtype=np.float64)
-            for name, column in zip(result.trajectory.column_names, result.trajectory.columns, strict=True)
-        }
+        columns = {name: numpy_array(result.trajectory[name]) for name in result.trajectory.column_names}
         return proof_of(self.scenario, columns), ""
 
     def notes(self) -> tuple[str, ...]:

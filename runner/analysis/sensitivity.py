@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from springline.runner.files import numpy_array
 from springline.runner.scenario import Scenario
 from springline.runner.sweep import batch
 
@@ -93,7 +94,7 @@ def sensitivities(scenario: Scenario, boundary: Callable[[dict[str, Floats]], Fl
     joints = scenario.system().joints
 
     def column(metric: str, joint: str) -> Floats:
-        return np.array(table[f"{metric}_{joint}"].to_numpy(zero_copy_only=False), dtype=np.float64)
+        return numpy_array(table[f"{metric}_{joint}"])
 
     found = []
     for metric, title in (("settling_time", "settling time"), ("steady_state_error", "steady-state error")):

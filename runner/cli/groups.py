@@ -6,6 +6,7 @@ A command is a function. Its docstring is its help: the first line stands in the
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from typing import Any
@@ -46,7 +47,8 @@ class _Commands(MutableMapping[str, Any]):
     """Commands by name: functions until one is asked for, then what click calls."""
 
     def __init__(self, sources: Callable[[], Sources], more: Callable[[], Sources], built: dict[str, Any]) -> None:
-        self._sources, self._more, self._built = dict(sources()), more, built
+        self._sources, self._built = dict(sources()), built
+        self._more = functools.cache(more)  # which looks through all that is installed
 
     def _source(self, name: str) -> Callable[[], Function] | None:
         return self._sources[name] if name in self._sources else self._more()[name]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import stat
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
@@ -14,7 +13,7 @@ import typer
 
 from springline.codegen.files import TEMPORARY
 from springline.runner.cli.completion import scenario_names
-from springline.runner.files import InputError, Problem, read_toml
+from springline.runner.files import InputError, Problem
 
 _BARE_WORD = re.compile(r"([^\W\d]|\.{0,2}/)[\w.:/+-]*")
 
@@ -84,6 +83,9 @@ def parse_set(text: str, source: str) -> tuple[str, object]:
     source  the scenario that it is to override, for messages
     Raises InputError if it is not of that form.
     """
+    import tomllib
+
+    from springline.runner.files import read_toml
     from springline.runner.scenario import given_text
 
     where = f"override of {source}"

@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from threading import Lock, Timer
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,15 +24,14 @@ _GAP = 3  # characters between two columns of a table
 _STEERING = ("Cc", "Cf", "Cs", "Zl", "Zp")
 
 
-def console(*, stderr: bool = False) -> Console:
+def console() -> Console:
     """Where to write, made anew for each use, for tests and shells replace sys.stdout.
 
     A pipe has no width to fold lines at, so what reads it gets whole lines, unless COLUMNS says how wide they may be.
     """
     from rich.console import Console
 
-    stream = sys.stderr if stderr else sys.stdout
-    return Console(stderr=stderr, width=_width(stream.isatty()), highlight=False, markup=False)
+    return Console(width=_width(sys.stdout.isatty()), highlight=False, markup=False)
 
 
 def _width(terminal: bool) -> int | None:
@@ -55,14 +54,19 @@ def printable(text: str) -> str:
 
 
 def say(text: str) -> None:
-    """A line on stdout."""
-    console().print(printable(text), soft_wrap=True)
+    """A line on stdout. Not by Rich, for which a command that only says something would wait."""
+    _write_line(sys.stdout, text)
 
 
 def complain(text: str) -> None:
     """A line on stderr."""
     with suppress(OSError):  # nobody can be told, and the exit code says it too
-        console(stderr=True).print(printable(text), soft_wrap=True)
+        _write_line(sys.stderr, text)
+
+
+def _write_line(stream: TextIO, text: str) -> None:
+    stream.write(f"{printable(text)}\n")
+    stream.flush()
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, right: Sequence[str] = ()) -> None:

@@ -1,6 +1,8 @@
 from .arrow import arrow_array as arrow_array
 from .arrow import arrow_numbers as arrow_numbers
+from .arrow import arrow_scalar as arrow_scalar
 from .arrow import arrow_texts as arrow_texts
+from .arrow import numpy_array as numpy_array
 from .errors import InputError as InputError
 from .errors import Problem as Problem
 from .errors import shortened as shortened

@@ -1,6 +1,7 @@
-"""Arrow arrays of NumPy's, made without pandas.
+"""Arrow arrays of NumPy's, and back, without pandas.
 
-pa.array imports pandas where that is installed, to ask whether what it is given is pandas': longer than a run takes.
+pa.array and pa.scalar import pandas where that is installed, to ask whether what they are given is pandas', and so do
+to_numpy and whatever takes a plain number or text for a scalar: longer than a run takes.
 """
 
 from __future__ import annotations
@@ -26,6 +27,30 @@ def arrow_array(values: Any, kind: pa.DataType, *, null: bool = False) -> pa.Arr
     if kind == pa.string() and all(isinstance(value, str) for value in values):
         return arrow_texts(values)
     return pa.array(values, kind, from_pandas=null)
+
+
+def arrow_scalar(value: Any, kind: pa.DataType) -> pa.Scalar:
+    """One value of the type `kind`, as `arrow_array` makes many."""
+    return arrow_array([value], kind)[0]
+
+
+def numpy_array(column: pa.Array | pa.ChunkedArray, *, null: float = np.nan) -> NDArray[Any]:
+    """A column of numbers or truth values, `null` in place of null; not to be written to, for it may be Arrow's own.
+
+    Raises ValueError for a `null` that is none of the column's type.
+    """
+    truth = pa.types.is_boolean(column.type)
+    whole = column
+    if column.null_count:
+        if truth and not isinstance(null, bool):
+            raise ValueError(f"expected a truth value in place of null, got {null!r}")
+        whole = column.fill_null(arrow_scalar(null, column.type))
+    if truth:  # eight of them share a byte
+        whole = whole.cast(pa.uint8())
+    chunks = whole.chunks if isinstance(whole, pa.ChunkedArray) else [whole]
+    parts = [np.from_dlpack(chunk) for chunk in chunks]
+    made = parts[0] if len(parts) == 1 else np.concatenate([np.zeros(0, whole.type.to_pandas_dtype()), *parts])
+    return made.view(np.bool_) if truth else made
 
 
 def arrow_texts(values: Sequence[str]) -> pa.Array:

@@ -18,7 +18,7 @@ from springline.model.control import SurfaceExponents
 from springline.model.structure import Structure
 from springline.model.theory import felt_acceleration
 from springline.runner.analysis import proof_of, reaching_law, signals_along
-from springline.runner.files import InputError, Problem
+from springline.runner.files import InputError, Problem, numpy_array
 from springline.runner.paper.cases import INPUTS, LAWS, cases, under
 from springline.runner.paper.evidence import Evidence, Inherent
 from springline.runner.paper.measured import Floats, Measured
@@ -278,7 +278,7 @@ def _run_all(scenarios: Mapping[Key, Scenario], progress: Progress | None) -> di
 
 def measure(scenario: Scenario, result: Result) -> Measured:
     """A Result as it is judged, with NaN for metrics that do not exist."""
-    columns = {name: result.trajectory[name].to_numpy() for name in result.trajectory.column_names}
+    columns = {name: numpy_array(result.trajectory[name]) for name in result.trajectory.column_names}
     (row,) = result.metrics.to_pylist()
     metrics = {key: float("nan") if value is None else float(value) for key, value in row.items() if key != "status"}
     return Measured(columns, metrics, result.status, result.message)

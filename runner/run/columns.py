@@ -48,12 +48,3 @@ def metrics_table(system: System, runs: Runs) -> pa.Table:
     columns = [arrow_numbers(runs.metrics[:, j, k], null=True) for k in range(len(METRICS)) for j in range(system.n)]
     status = arrow_texts([STATUS[i] for i in runs.status])
     return pa.Table.from_arrays([*columns, status, arrow_numbers(runs.end_time)], schema=metrics_schema(system))
-
-
-def values(column: pa.ChunkedArray) -> Floats:
-    """A column of doubles as an array, NaN for null.
-
-    Not by to_numpy, nor with a value for null unless there is one: both import pandas where that is installed.
-    """
-    parts = [np.from_dlpack(part) for part in (column.fill_null(np.nan) if column.null_count else column).chunks]
-    return np.asarray(parts[0] if len(parts) == 1 else np.concatenate([np.zeros(0), *parts]), dtype=np.float64)

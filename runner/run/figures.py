@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from springline.model.base import BaseCoordinate
 from springline.model.parameters import Joint
 from springline.model.quantities import DISTURBANCE, Q1, Q2, SIGMA, TIP, U_CMD, E, Quantity, U
-from springline.runner.files import units
+from springline.runner.files import numpy_array, units
 from springline.runner.report import (
     LINES,
     PAGE,
@@ -31,7 +31,6 @@ from springline.runner.report import (
     quantity_text,
     symbol,
 )
-from springline.runner.run.columns import values
 from springline.runner.run.simulated import Simulated
 from springline.runner.scenario import Scenario
 
@@ -130,7 +129,7 @@ class _Run:
         )
 
     def __getitem__(self, column: str) -> Floats:
-        return values(self._table[column])
+        return numpy_array(self._table[column])
 
     @property
     def settled(self) -> NDArray[np.bool_]:

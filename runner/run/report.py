@@ -15,7 +15,7 @@ from springline.codegen.kernel import CHATTERING, chatters
 from springline.model.metrics import METRICS
 from springline.model.parameters import Joint
 from springline.model.quantities import Q1, Q2, SIGMA, U_CMD, E, U
-from springline.runner.files import units
+from springline.runner.files import numpy_array, units
 from springline.runner.report import (
     Block,
     Document,
@@ -30,7 +30,6 @@ from springline.runner.report import (
     shown_name,
     to_html,
 )
-from springline.runner.run.columns import values
 from springline.runner.run.simulated import Simulated
 from springline.runner.run.trajectory_hash import trajectory_hash
 from springline.runner.scenario import Scenario
@@ -127,7 +126,7 @@ class _Numbers:
         self._metrics: Mapping[str, Any] = result.metrics.to_pylist()[0]
 
     def __getitem__(self, column: str) -> Floats:
-        return values(self._table[column])
+        return numpy_array(self._table[column])
 
     def metric(self, name: str, joint: Joint) -> float | None:
         value: float | None = self._metrics[f"{name}_{joint.name}"]

@@ -7,7 +7,7 @@ import hashlib
 import numpy as np
 import pyarrow as pa
 
-from springline.runner.run.columns import values
+from springline.runner.files import numpy_array
 
 _NAN = np.uint64(0x7FF8000000000000)
 
@@ -21,7 +21,7 @@ def trajectory_hash(trajectory: pa.Table) -> str:
     digest = hashlib.sha256()
     for column in trajectory.columns:
         if column.type == pa.float64():
-            bits = np.array(values(column)).view(np.uint64)
+            bits = np.array(numpy_array(column)).view(np.uint64)
             bits[np.isnan(bits.view(np.float64))] = _NAN
             digest.update(bits.astype("<u8").tobytes())
     return digest.hexdigest()

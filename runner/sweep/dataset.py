@@ -24,7 +24,7 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from springline.codegen.files import TEMPORARY, canonical_json
-from springline.runner.files import InputError, Problem, read_toml, unknown
+from springline.runner.files import InputError, Problem, numpy_array, read_toml, unknown
 from springline.runner.run import trajectory_schema
 from springline.runner.scenario import FOLDER as TABLES
 from springline.runner.sweep.changes import changes
@@ -199,7 +199,9 @@ class Dataset:
         """The part of a chunk, with what is wrong with it. Raises FileNotFoundError if it is not there."""
         name, last = _PART.format(chunk.number), chunk.first + chunk.runs - 1
         opened = self._opened(name, Seal(self.identity, (chunk.first, last)), plan.schema, chunk.runs)
-        if opened.table is not None and not np.array_equal(opened.table["run"], np.arange(chunk.first, last + 1)):
+        if opened.table is not None and not np.array_equal(
+            numpy_array(opened.table["run"]), np.arange(chunk.first, last + 1)
+        ):
             return Opened(None, "holds other runs")
         return opened
 
@@ -236,13 +238,15 @@ class Dataset:
         where = f"{self.place.name}/{name}"
         try:
             with self.place.open(name) as file:
-                there = parquet.read_schema(file)
-                missing = [column for column in columns or () if column not in there.names]
+                stored = parquet.ParquetFile(file)  # read_table imports pandas where that is installed
+                there = stored.schema_arrow.names
+                missing = [column for column in columns or () if column not in there]
                 if missing:
-                    raise InputError(*(unknown(where, "", "column", column, there.names) for column in missing))
-                file.seek(0)
+                    raise InputError(*(unknown(where, "", "column", column, there) for column in missing))
                 # One thread: a column of a part is too little for more, and each would keep memory of its own.
-                table = parquet.read_table(file, columns=columns, use_threads=False)
+                table = stored.read(columns, use_threads=False)
+                if columns is not None:
+                    table = table.select(columns)  # in this order
         except InputError:
             raise
         except (pa.ArrowException, ValueError) as error:
@@ -275,7 +279,7 @@ def _expect_each_run_once(dataset: Dataset, tables: Sequence[pa.Table]) -> None:
     """Raise InputError for a part that holds runs that an earlier one has: a copy in another's place, or a surplus."""
     last = -1
     for name, table in zip(dataset.parts(), tables, strict=True):
-        runs = table["run"].to_numpy()
+        runs = numpy_array(table["run"])
         if len(runs) and (runs[0] <= last or np.any(np.diff(runs) <= 0)):
             text = (
                 "holds runs that an earlier part has: springline batch --resume makes a part of the sweep again; one "

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from springline.codegen.kernel import CHATTERING
+from springline.runner.files import numpy_array
 from springline.runner.report import LINES, PAGE, house_style, legend_above, panels
 from springline.runner.sweep.influence import correlation, effects, most_influential
 from springline.runner.sweep.map import metric_map, outcome_map
@@ -76,7 +77,7 @@ def _shown(plan: Plan, summary: Summary) -> Runs:
     axes = plan.numeric_axes()
     of_groups = group_names(plan)
     names = list(dict.fromkeys(of_groups))
-    group = np.searchsorted([group.first for group in plan.groups], summary.shown["run"].to_numpy(), side="right") - 1
+    group = np.searchsorted([group.first for group in plan.groups], numpy_array(summary.shown["run"]), side="right") - 1
     return Runs(
         summary.shown,
         summary.units,

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from pyarrow import compute, parquet
+from pyarrow import parquet
 
-from springline.runner.files import parquet_bytes
+from springline.runner.files import arrow_scalar, numpy_array, parquet_bytes
 
 _SWEEP, _RUNS, _CONTENT = b"springline.sweep", b"springline.runs", b"springline.sha256"
 
@@ -105,15 +105,15 @@ def content_hash(table: pa.Table) -> str:
     for field, chunked in zip(table.schema, table.columns, strict=True):
         digest.update(f"{field.type} {len(chunked)}\n".encode())
         column = chunked.combine_chunks()
-        digest.update(compute.cast(column.is_valid(), pa.uint8()).to_numpy().tobytes())
+        digest.update(numpy_array(column.is_valid()).tobytes())
         if pa.types.is_string(field.type):
-            texts = [text.encode() for text in column.fill_null("").to_pylist()]
+            texts = [text.encode() for text in column.fill_null(arrow_scalar("", pa.string())).to_pylist()]
             digest.update(np.array([len(text) for text in texts], dtype="<i8").tobytes())
             digest.update(b"".join(texts))
         elif pa.types.is_boolean(field.type):
-            digest.update(compute.cast(column.fill_null(fill_value=False), pa.uint8()).to_numpy().tobytes())
+            digest.update(numpy_array(column, null=False).tobytes())
         elif field.type in (pa.float64(), pa.int64()):
-            values = column.fill_null(0).to_numpy()
+            values = numpy_array(column, null=0)
             digest.update(np.ascontiguousarray(values, values.dtype.newbyteorder("<")).tobytes())
         else:
             raise TypeError(f"{field.name}: a column of {field.type} has no place in a dataset")

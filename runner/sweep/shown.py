@@ -11,6 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from springline.model.parameters import Joint
+from springline.runner.files import numpy_array
 from springline.runner.report import label, name_axis
 from springline.runner.sweep.summary import chattering
 
@@ -34,7 +35,7 @@ class Runs:
     gridded: bool
 
     def __getitem__(self, column: str) -> Floats:
-        return np.asarray(self.table[column].cast(pa.float64()).to_numpy(), dtype=np.float64)
+        return numpy_array(self.table[column].cast(pa.float64()))
 
     @property
     def ok(self) -> NDArray[np.bool_]:

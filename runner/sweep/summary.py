@@ -18,7 +18,7 @@ from pyarrow import compute
 
 from springline.codegen.kernel import METRICS, STATUS, chatters
 from springline.model.parameters import Joint
-from springline.runner.files import arrow_array, units
+from springline.runner.files import arrow_array, arrow_scalar, numpy_array, units
 from springline.runner.sweep import sampling
 from springline.runner.sweep.dataset import Dataset
 from springline.runner.sweep.plan import Chunk, Plan
@@ -92,7 +92,8 @@ def summarize(plan: Plan, dataset: Dataset, done: Collection[int] | None = None)
         outcomes[names[chunk.group.number]][CHATTERED] += int(np.count_nonzero(chattering(table, joints)))
         picked = table.filter(arrow_array(_picked(chunk, runs), pa.bool_()))
         for name, column in gathered.items():
-            column[row : row + len(picked)] = picked[name].to_numpy()
+            given = picked[name]
+            column[row : row + len(picked)] = given.to_pylist() if column.dtype == object else numpy_array(given)
         row += len(picked)
     shown = pa.table([arrow_array(gathered.pop(f.name), f.type, null=True) for f in plan.schema], plan.schema)
     metrics = _distributions(dataset, parts, shown, joints)
@@ -141,7 +142,7 @@ def _extremes(
 
 def _numbers(table: pa.Table, column: str) -> Floats:
     """A column of numbers, NaN for null."""
-    return np.asarray(table[column].to_numpy(), dtype=np.float64)
+    return np.asarray(numpy_array(table[column]), dtype=np.float64)
 
 
 def chattering(table: pa.Table, joints: Sequence[Joint]) -> NDArray[np.bool_]:
@@ -153,7 +154,7 @@ def chattering(table: pa.Table, joints: Sequence[Joint]) -> NDArray[np.bool_]:
 
 def _ended(table: pa.Table, outcome: str) -> NDArray[np.bool_]:
     """Which runs ended so."""
-    return np.asarray(compute.cast(compute.equal(table["status"], outcome), pa.uint8()).to_numpy(), dtype=np.bool_)
+    return numpy_array(compute.equal(table["status"], arrow_scalar(outcome, pa.string())))
 
 
 def _badness(table: pa.Table, scales: Mapping[str, float]) -> Floats:

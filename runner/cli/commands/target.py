@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from springline.codegen.files import MANIFEST, Stale, check_tree, read_manifest, summary, write_tree
 from springline.runner.cli.options import (
     TUNABLE,
     AsJson,
@@ -28,6 +27,7 @@ from springline.runner.files import InputError, Problem
 
 if TYPE_CHECKING:
     from springline.codegen.export import Export, Target
+    from springline.codegen.files import Stale
 
 Tree = Callable[["Export"], tuple[dict[str, bytes], dict[str, Any]]]
 """Files of an Export by path, and what the manifest says beside their list."""
@@ -85,6 +85,7 @@ def tree_command(
     ) -> None:
         from springline.codegen.export import bind
         from springline.codegen.export.c import Overflow
+        from springline.codegen.files import check_tree
         from springline.runner.analysis import timing
         from springline.runner.scenario import load_scenario
 
@@ -148,6 +149,8 @@ def target_command(name: str, target: Target) -> Callable[..., None]:
 def _write(
     name: str, output: Path, files: dict[str, bytes], manifest: dict[str, Any], force: bool, as_json: bool
 ) -> None:
+    from springline.codegen.files import MANIFEST, write_tree
+
     changes = write_tree(output, files, manifest, force=force)
     if as_json:
         done = {**dict.fromkeys(changes.written, "written"), **dict.fromkeys(changes.removed, "removed")}
@@ -162,6 +165,8 @@ def _write(
 
 
 def _report_check(name: str, output: Path, stale: list[Stale], files: int, as_json: bool) -> None:
+    from springline.codegen.files import summary
+
     if as_json:
         print_json(name, [entry._asdict() for entry in stale], {}, "stale" if stale else "ok")
     elif len(stale) == files + 1 and all(entry.kind == "missing" for entry in stale):
@@ -172,6 +177,8 @@ def _report_check(name: str, output: Path, stale: list[Stale], files: int, as_js
 
 def _report_options(output: Path, manifest: Mapping[str, Any]) -> None:
     """Say which options a stale folder was made with, where they are not those of this command."""
+    from springline.codegen.files import read_manifest
+
     there = read_manifest(output, manifest.get("kind"))
     made = there.get("options") if there else None
     if not isinstance(made, dict):

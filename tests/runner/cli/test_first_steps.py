@@ -7,7 +7,7 @@ import json
 import shlex
 import subprocess
 import sys
-from importlib.metadata import requires
+from importlib.metadata import EntryPoint, requires
 from pathlib import Path
 from typing import Any
 
@@ -138,11 +138,14 @@ def test_examples_do_what_they_say(name: str) -> None:
 @pytest.mark.parametrize(
     ("words", "heavy"),
     [
-        (["--help"], {"casadi", "numpy", "matplotlib", "pyarrow", "scipy", "pydantic", "rich"}),
+        (["--help"], {"casadi", "numpy", "matplotlib", "pyarrow", "scipy", "pydantic", "rich", "hashlib", "tomllib"}),
+        (["--version"], {"casadi", "numpy", "pydantic", "rich", "springline.runner.cli.options"}),
         (["run", "--help"], {"casadi", "numpy", "matplotlib", "pyarrow", "scipy"}),
         (["list", "scenarios"], {"casadi", "numpy", "matplotlib", "pyarrow", "scipy"}),
         (["list", "sweeps"], {"casadi", "numpy", "matplotlib", "pyarrow", "scipy"}),
-        (["list", "laws"], {"matplotlib", "pyarrow", "scipy", "springline.runner.scenario.schema"}),
+        (["list", "laws"], {"casadi", "numpy", "matplotlib", "pyarrow", "scipy", "springline.runner.scenario"}),
+        (["list", "controllers"], {"casadi", "numpy", "matplotlib", "pyarrow", "scipy", "springline.runner.scenario"}),
+        (["list", "mechanisms"], {"casadi", "numpy", "matplotlib", "pyarrow", "scipy", "springline.runner.scenario"}),
         (["cache", "show"], {"casadi", "numpy", "matplotlib", "pyarrow", "scipy"}),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
@@ -156,6 +159,21 @@ def test_a_command_imports_nothing_that_it_does_not_use(words: list[str], heavy:
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert not heavy & set(shown.splitlines()[-1].split())
+
+
+def test_the_help_looks_for_commands_of_other_packages_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which takes longer than to import all commands of this one; a command of this one does not look for others."""
+    asked: list[str] = []
+
+    def found(*, group: str) -> list[EntryPoint]:
+        asked.append(group)
+        return [EntryPoint("another", f"{doctor.__name__}:doctor", group)]
+
+    monkeypatch.setattr("importlib.metadata.entry_points", found)
+    assert "  another " in springline("--help").stdout
+    assert asked == ["springline.commands"]
+    assert springline("cache", "show").exit_code == 0
+    assert asked == ["springline.commands"]
 
 
 # --- cache and doctor --------------------------------------------------------------------------------------

@@ -7,8 +7,6 @@ import math
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
@@ -412,14 +410,6 @@ def test_batch_writes_a_dataset_with_its_summary(sweep: Path, tmp_path: Path, co
 def test_the_packaged_sweeps_are_named_in_the_help(command: Command) -> None:
     said = " ".join(command("batch", "--help").stdout.split())
     assert f"a packaged sweep: {', '.join(packaged_sweeps())}." in said
-
-
-def test_without_figures_the_library_that_draws_them_is_not_loaded(sweep: Path, tmp_path: Path) -> None:
-    code = "import sys; from springline.runner.cli import app; app(standalone_mode=False); print(*sys.modules)"
-    words = [sys.executable, "-c", code, "batch", sweep, "-o", tmp_path / "data", "--no-plot"]
-    modules = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
-    assert "pyarrow" in modules
-    assert "matplotlib" not in modules
 
 
 def test_replay_is_bit_identical_and_notices_what_is_not(sweep: Path, tmp_path: Path, command: Command) -> None:
