@@ -65,9 +65,10 @@ INPUTS: Mapping[str, tuple[float, float, bool]] = {
 }
 
 COARSE = 2e-4
-"""s, step of the search. What is found is run with FINE. Twice as large, RK4 damps the springs where the inertia is small:
-searches found inputs then whose motion is the step's."""
+"""s, step of the search where nothing else is said. Twice as large, RK4 damps the springs where the inertia is small: a
+search may find inputs then whose motion is the step's."""
 FINE = 1e-4
+"""s, step with which what is found is run."""
 
 
 def scenarios(step: float) -> list[Scenario]:
@@ -146,8 +147,8 @@ class Journal:
     A seeded search asks the same questions in the same order, so it goes on as if it had never been stopped.
     """
 
-    def __init__(self, path: Path, most: float) -> None:
-        self.path, self.most = path, most
+    def __init__(self, path: Path, most: float, step: float) -> None:
+        self.path, self.most, self.step = path, most, step
         self.entries = json.loads(path.read_text()) if path.exists() else []
         self.next = 0
 
@@ -170,12 +171,12 @@ class Journal:
         os.replace(temporary, self.path)
 
     def _digest(self, unit: Floats) -> str:
-        return sha256(np.append(np.ascontiguousarray(unit, "<f8"), self.most).tobytes()).hexdigest()
+        return sha256(np.append(np.ascontiguousarray(unit, "<f8"), [self.most, self.step]).tobytes()).hexdigest()
 
 
 def search(seed: int, generations: int, population: int, journal: Journal, jobs: int | None) -> Floats:
     """The best point of the unit cube that a seed finds."""
-    laws = scenarios(COARSE)
+    laws = scenarios(journal.step)
 
     def costs(unit: Floats) -> Floats:
         known = journal.answer(unit)
@@ -233,6 +234,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--heave", type=float, default=np.inf, help="at most so much, m/s^2 rms")
+    parser.add_argument("--step", type=float, default=COARSE, help="of the search, s")
     parser.add_argument("--state", type=Path, default=Path("identify_state"), help="folder of the state files")
     given = parser.parse_args()
     given.state.mkdir(parents=True, exist_ok=True)
@@ -241,7 +243,7 @@ def main() -> None:
             seed,
             given.generations,
             given.population,
-            Journal(given.state / f"seed{seed}.json", given.heave),
+            Journal(given.state / f"seed{seed}.json", given.heave, given.step),
             given.jobs,
         )
         for seed in given.seeds
