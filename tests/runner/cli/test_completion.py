@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from springline.runner.cli import app
 from springline.runner.cli.shell_words import prepare
 
+SETUP = Path(__file__).parents[3] / "docs/setup.md"
 MAIN = "from springline.runner.cli import main; main()"
 OWN_ARM = """
 from pathlib import Path
@@ -189,6 +190,13 @@ def test_a_bash_without_gaps_at_equals_signs_gets_whole_words() -> None:
     words = f"{RUN}control.law=p".split(" ")
     shown = asked(_SPRINGLINE_COMPLETE="complete_bash", COMP_WORDS="\n".join(words), COMP_CWORD="4")
     assert shown.split() == ["control.law=power"]
+
+
+def test_what_the_documentation_shows_is_offered() -> None:
+    rows = re.findall(r"^\| `([^`]+)` \| (`[^|]+`) \|$", SETUP.read_text("utf-8").partition("TAB key")[2], re.MULTILINE)
+    assert len(rows) > 5
+    for typed, offered in rows:
+        assert in_bash(f"springline {typed}") == re.findall("`([^`]+)`", offered), typed
 
 
 class Terminal:
