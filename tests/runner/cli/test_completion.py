@@ -9,7 +9,7 @@ import select
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -206,10 +206,18 @@ class Terminal:
         program = folder / "springline"
         program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -c "{MAIN}" "$@"\n')
         program.chmod(0o755)
-        environment = {**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "TERM": "dumb", "PS1": "> "}
-        self._child, self._screen = pty.fork()
-        if not self._child:
-            os.execvpe("bash", ["bash", "--norc", "--noprofile", "-i"], environment)  # noqa: S606
+        plain = {"TERM": "dumb", "PS1": "> ", "PROMPT_COMMAND": "", "INPUTRC": os.devnull}
+        environment = {**os.environ, **plain, "PATH": f"{folder}:{os.environ['PATH']}"}
+        self._screen, inside = pty.openpty()
+        self._bash = subprocess.Popen(
+            ["bash", "--norc", "--noprofile", "-i"],
+            env=environment,
+            stdin=inside,
+            stdout=inside,
+            stderr=inside,
+            start_new_session=True,
+        )
+        os.close(inside)
 
     def types(self, keys: str, until: str) -> str:
         """Type, and read what comes onto the screen, without bells, until something stands there."""
@@ -223,16 +231,22 @@ class Terminal:
 
     def ends(self) -> None:
         """Close it."""
+        self._bash.kill()
+        self._bash.wait()
         os.close(self._screen)
-        os.waitpid(self._child, 0)
 
 
-def test_typing_in_a_bash(elsewhere: Path, require_tool: Callable[..., str]) -> None:
-    """Readline's own words, and what it does with the candidates."""
+@pytest.fixture
+def bash(elsewhere: Path, require_tool: Callable[..., str]) -> Iterator[Terminal]:
     require_tool("bash")
-    bash = Terminal(elsewhere)
+    terminal = Terminal(elsewhere)
+    yield terminal
+    terminal.ends()
+
+
+def test_typing_in_a_bash(bash: Terminal) -> None:
+    """Readline's own words, and what it does with the candidates; the line fits 80 columns, lest it be scrolled."""
     bash.types('eval "$(springline --show-completion bash)"; echo rea""dy\n', "ready\r\n> ")
-    bash.types("springline run paper/nominal --set control.del\t", "control.delta=")
+    bash.types("springline run --set control.del\t", "control.delta=")
     bash.types("\t", "0.05 ")
     bash.types("--set control.law=do\t", "control.law=double_power ")
-    bash.ends()
