@@ -31,12 +31,14 @@ from springline.runner.sweep import load_sweep
 ROOT = Path(__file__).parent.parent
 OTHERS = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "examples/README.md")]
 PAGES = [*OTHERS, *sorted((ROOT / "docs").glob("*.md"))]
-SHOWING = (ROOT / "README.md", ROOT / "docs/tutorial.md")  # show what is printed, and so have a test of their own
+# Show what is printed, and so have a test of their own.
+SHOWING = (ROOT / "README.md", ROOT / "docs/setup.md", ROOT / "docs/tutorial.md")
 HOUSE = ROOT / "docs/architecture.md"  # changes springline itself, and so has a test of its own
 PROGRAMS = ("springline", "make", "pip", "python", "fmpy")
 STEPS = 100  # of every documented run
 
 ELSEWHERE = {
+    "springline --install-completion": "changes a shell; tests/runner/cli/test_completion.py types in one",
     "make reproduce": "minutes; tests/runner/paper/test_paper.py reproduces a group",
     "make test": "this very test among them",
     "make -C examples/equal_bits host": "tests/runner/test_reproducible_chatter.py does",
@@ -260,6 +262,8 @@ def test_a_page_s_commands_print_what_it_shows(
     """With its runs in full length; the figures alone are not drawn."""
     require_tool("cc")
     monkeypatch.chdir(tmp_path)
+    if "springline cache clear" in page.read_text("utf-8"):
+        monkeypatch.setenv("SPRINGLINE_CACHE", str(tmp_path / "cache"))  # not the one that all tests share
     monkeypatch.setattr(
         "springline.runner.report.figure_files", lambda name, _: {f"{name}.png": b"", f"{name}.svg": b""}
     )

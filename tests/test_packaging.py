@@ -21,7 +21,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
-EXTRAS = {"bench", "compiler", "dev", "distributed", "docs", "fmu", "verify"}
+EXTRAS = {"bench", "compiler", "dev", "distributed", "docs", "fmu", "notebook", "verify"}
 PACKAGES = ("benchmarks", "codegen", "generated", "model", "runner")
 FACE = {"__init__.py", "__init__.pyi", "py.typed"}
 CARRIED = (*PACKAGES, "docs", "examples", "springline", "tests")
@@ -112,6 +112,7 @@ def test_wheel_carries_every_shipped_file(wheel: set[str]) -> None:
     assert shipped == tree(*PACKAGES) | FACE
     for needed in (
         "codegen/runtime/loop.c",
+        "runner/cli/templates/notebook.ipynb",
         "codegen/export/c/templates/springline.h.j2",
         "codegen/export/fmu/templates/index.html.j2",
         "runner/report/templates/report.html.j2",

@@ -11,6 +11,7 @@ same checkout gives the same bytes.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
 import shutil
@@ -110,7 +111,12 @@ def page_name(path: Path) -> str:
 
 
 def shown(path: Path) -> str:
-    """A page that shows a file."""
+    """A page that shows a file; a notebook is one already, in pieces."""
+    if path.suffix == ".ipynb":
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        texts = [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
+        pieces = [text if kind == "markdown" else f"```python\n{text}\n```" for kind, text in texts]
+        return "\n\n".join(pieces) + "\n"
     language = LANGUAGES.get(path.suffix or path.name, "text")
     return f"# {path.relative_to(ROOT)}\n\n````{language}\n{path.read_text(encoding='utf-8').rstrip()}\n````\n"
 

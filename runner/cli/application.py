@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO, cast
 import typer
 
 from springline.runner.cli.groups import Function, LazyGroup, Sources, example_epilog
+from springline.runner.cli.shell_words import prepare
 from springline.runner.cli.terminal import complain, say
 
 if TYPE_CHECKING:
@@ -167,6 +168,8 @@ def springline(
 def main() -> None:
     """Entry point of the `springline` command."""
     _open_streams()
+    if prepare(os.environ) and not os.environ.get(_TRACEBACK):
+        _close(sys.stderr)  # it is the line that somebody types in
     _expect_working_directory()
     _mend_environment()
     code: Any = 0

@@ -90,6 +90,18 @@ def house_style() -> Iterator[None]:
         yield
 
 
+class NotebookFigure(Figure):
+    """A figure that a notebook shows by itself: pyplot, which else has it do so, need not have been used before."""
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        """PNG with two pixels for each that it takes on the page, and its width and height there."""
+        width, height = (round(inches * self.dpi) for inches in self.get_size_inches())
+        pixels = io.BytesIO()
+        with house_style():
+            self.savefig(pixels, format="png", dpi=2 * self.dpi)
+        return pixels.getvalue(), {"width": width, "height": height}
+
+
 def panels(
     rows: int = 1,
     columns: int = 1,
@@ -99,7 +111,7 @@ def panels(
     share_x: bool | Literal["col"] = True,
 ) -> tuple[Figure, NDArray[Any]]:
     """A figure and its (rows, columns) array of Axes; width of the figure and height of a row in inches."""
-    figure = Figure(figsize=(width, height * rows + 0.5))
+    figure = NotebookFigure(figsize=(width, height * rows + 0.5))
     return figure, figure.subplots(rows, columns, sharex=share_x, squeeze=False)
 
 

@@ -25,6 +25,9 @@ from .schema import given_text as given_text
 from .schema import names_file as names_file
 from .schema import number_text as number_text
 from .schema import unit_text as unit_text
+from .settable import Settable as Settable
+from .settable import settable_keys as settable_keys
+from .settable import settable_without_code as settable_without_code
 from .signal_files import FOLDER as FOLDER
 from .signal_files import Record as Record
 from .signal_files import path_keys as path_keys

@@ -80,10 +80,14 @@ class Leaf:
 
     expected  what is expected, for messages
     check     returns the value in its final form, or raises
+    names     what may stand there, without quotes, where it can be listed
+    entries   what may stand at each place, where it may be a list
     """
 
     expected: str
     check: Callable[[object], Any]
+    names: tuple[str, ...] = ()
+    entries: tuple[Leaf, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.check)
@@ -118,7 +122,7 @@ def per_joint(numbers: Sequence[Leaf], joints: Sequence[Joint]) -> Leaf:
         pairs = enumerate(zip(numbers, value, strict=True))
         return [_checked(item, entry, item.expected, at=(i,), given=entry) for i, (item, entry) in pairs]
 
-    return Leaf(expected, check)
+    return Leaf(expected, check, entries=tuple(numbers))
 
 
 def plant_value(own: Leaf, scale: Leaf) -> Leaf:
@@ -134,7 +138,7 @@ def plant_value(own: Leaf, scale: Leaf) -> Leaf:
         factor = value.get("scale", "")
         return {"scale": _checked(scale, factor, scale.expected, at=("scale",), given=factor)}
 
-    return Leaf(expected, check)
+    return Leaf(expected, check, entries=own.entries)
 
 
 def whole(most: int, *, odd: bool = False) -> Leaf:
@@ -170,7 +174,7 @@ def one_of(numbers: Sequence[int], meaning: str) -> Leaf:
             return value
         raise _wrong(f"expected {expected}")
 
-    return Leaf(expected, check)
+    return Leaf(expected, check, tuple(map(str, numbers)))
 
 
 def flag() -> Leaf:
@@ -181,7 +185,7 @@ def flag() -> Leaf:
             return value
         raise _wrong("expected true or false")
 
-    return Leaf("true or false", check)
+    return Leaf("true or false", check, ("true", "false"))
 
 
 def text() -> Leaf:
@@ -204,7 +208,7 @@ def choice(kind: str, names: Iterable[str]) -> Leaf:
             return value
         raise _wrong(f"unknown {kind}", name=value if isinstance(value, str) else "", valid=names)
 
-    return Leaf(" or ".join(f'"{name}"' for name in names), check)
+    return Leaf(" or ".join(f'"{name}"' for name in names), check, names)
 
 
 def names_file(text: object) -> bool:
@@ -214,11 +218,12 @@ def names_file(text: object) -> bool:
 
 def door(kind: str, registry: Registry[Any]) -> Leaf:
     """One of those that come with springline, or a class of a user's file; `kind` says what they name."""
+    packaged = choice(kind, registry)
 
     def check(value: object) -> str:
         return str(value) if names_file(value) else str(choice(kind, registry).check(value))
 
-    return Leaf(f'{choice(kind, registry).expected} or "FILE.py:CLASS"', check)
+    return Leaf(f'{packaged.expected} or "FILE.py:CLASS"', check, packaged.names)
 
 
 def scale() -> Leaf:
@@ -248,7 +253,7 @@ def triple(entries: Sequence[tuple[str, str, str]]) -> Leaf:
         pairs = enumerate(zip(numbers, value, strict=True))
         return [_checked(item, entry, item.expected, at=(i,), given=entry) for i, (item, entry) in pairs]
 
-    return Leaf(expected, check)
+    return Leaf(expected, check, entries=tuple(numbers))
 
 
 def several(item: Leaf) -> Leaf:
@@ -293,7 +298,7 @@ def motor_start(given: Leaf) -> Leaf:
     def check(value: object) -> object:
         return named.check(value) if isinstance(value, str) else given.check(value)
 
-    return Leaf(f"{named.expected} or {given.expected}", check)
+    return Leaf(f"{named.expected} or {given.expected}", check, named.names, given.entries)
 
 
 def _checked(leaf: Leaf, value: object, expected: str, **context: Any) -> Any:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from springline.runner.cli.options import Changes, NoCode, ScenarioName, expect_folder, overrides, refuse_results
+from springline.runner.cli.options import Changes, NoCode, ScenarioName, expect_folder, refuse_results
+from springline.runner.cli.overrides import overrides
 from springline.runner.cli.terminal import complain, number, print_json, print_table, progress, say
 from springline.runner.files import InputError, Problem
 

@@ -14,7 +14,8 @@ import typer
 
 from springline.runner.cli.amounts import size_text, time_text
 from springline.runner.cli.completion import sweep_names
-from springline.runner.cli.options import Changes, NoCode, overrides
+from springline.runner.cli.options import Changes, NoCode
+from springline.runner.cli.overrides import overrides
 from springline.runner.cli.terminal import complain, console, print_json, print_table, say
 
 if TYPE_CHECKING:

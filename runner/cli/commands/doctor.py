@@ -23,6 +23,7 @@ _EXTRAS = {
     "compiler": "compiler without a system's",
     "bench": "contenders of bench",
     "verify": "independent engines",
+    "notebook": "notebooks",
     "docs": "documentation as a site",
 }
 

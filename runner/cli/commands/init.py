@@ -22,6 +22,7 @@ class Kind(StrEnum):
     arm = "arm"
     controller = "controller"
     sweep = "sweep"
+    notebook = "notebook"
 
 
 # What is written for each, the template that it is, and the command that comes next.
@@ -33,6 +34,7 @@ _STARTS: dict[Kind, tuple[dict[str, str], str]] = {
         "springline run {scenario}",
     ),
     Kind.sweep: ({"sweep.toml": "sweep.toml", "scenario.toml": "scenario.toml"}, "springline batch {sweep}"),
+    Kind.notebook: ({"notebook.ipynb": "notebook.ipynb"}, "jupyter lab {notebook}"),
 }
 
 
@@ -44,7 +46,8 @@ def init(
     """Write commented files to start from.
 
     A scenario with the keys that one changes first; an arm or a controller of your own, with a scenario that runs it;
-    or a sweep with its scenario. Nothing is written if one of the files is there.
+    a sweep with its scenario; or a notebook that goes through all of it in Python. Nothing is written if one of the
+    files is there.
 
     Example: springline init controller -o my_controller
     """

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from springline.runner.cli.completion import scenario_names
-from springline.runner.cli.options import Changes, NoCode, overrides
+from springline.runner.cli.options import Changes, NoCode
+from springline.runner.cli.overrides import overrides
 from springline.runner.cli.terminal import complain, print_json, print_table
 from springline.runner.files import InputError, Problem
 

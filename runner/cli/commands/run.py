@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from springline.runner.cli.completion import scenario_names
-from springline.runner.cli.options import Changes, NoCode, overrides, refuse_occupied
+from springline.runner.cli.options import Changes, NoCode, refuse_occupied
+from springline.runner.cli.overrides import overrides
 from springline.runner.cli.terminal import complain, number, print_json, print_table, progress, say
 from springline.runner.files import InputError, Problem
 

@@ -18,10 +18,10 @@ from springline.runner.cli.options import (
     NoCode,
     ScenarioName,
     expect_folder,
-    overrides,
     refuse_results,
     tunable_names,
 )
+from springline.runner.cli.overrides import overrides
 from springline.runner.cli.terminal import complain, print_json, say
 from springline.runner.files import InputError, Problem
 

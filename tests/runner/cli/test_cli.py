@@ -33,7 +33,7 @@ from springline.model.drive import FRICTION
 from springline.model.hardware import EFFECTS
 from springline.runner.cli import app, terminal
 from springline.runner.cli.commands import run as run_command
-from springline.runner.cli.options import parse_set
+from springline.runner.cli.overrides import parse_set
 from springline.runner.files import InputError, units
 from springline.runner.paper import reproduction
 from springline.runner.paper.evidence import Check, Finding

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 from typing import Any
 
@@ -33,6 +34,9 @@ def test_a_notebook_shows_metrics_with_units_and_a_figure(result: Any) -> None:
 def test_figures_by_name(result: Any) -> None:
     assert isinstance(result.plot(), Figure)
     assert isinstance(result.plot("springs"), Figure)
+    picture, size = result.plot()._repr_png_()
+    assert picture.startswith(b"\x89PNG") and size["width"] > 500
+    assert struct.unpack(">II", picture[16:24]) == (2 * size["width"], 2 * size["height"])
     with pytest.raises(ValueError, match=r"there is no figure 'tip_', expected one of tracking, error"):
         result.plot("tip_")
 
