@@ -116,7 +116,7 @@ def _write_figures(plan: Plan, dataset: Dataset, summary: Summary) -> list[Pictu
         files = figure_files(name, figure)
         for file, content in files.items():
             dataset.place.write(file, content)
-        pictures.append(Picture(name, files[f"{name}.svg"], said[name], files[f"{name}.png"]))
+        pictures.append(Picture(name, files[f"{name}.svg"], said[name]))
     return pictures
 
 
@@ -133,7 +133,7 @@ def _document(plan: Plan, summary: Summary, pictures: Sequence[Picture]) -> Docu
         Text(_headline(summary)),
         Table(outcomes, rows),
         Text(
-            f"A run chatters where `chatter_` of a joint is above {CHATTERING:g} 1/s: its command swings so often that "
+            f"A run chatters where a joint's `chatter` is above {CHATTERING:g} 1/s: its command swings so often that "
             "its other metrics say little."
         ),
         Heading("Best and worst runs"),
@@ -250,7 +250,7 @@ def _ranked(title: str, plan: Plan, summary: Summary, found: Sequence[Mapping[st
             f"[[{_ended(row, plan)}]]",
             quantity_text(row["t_end"], "s"),
             *(quantity_text(row[name], summary.units[name]) for name in results),
-            *(_cell(row[key]) for key in keys),
+            *(figure_text(row[key], 6) if isinstance(row[key], float) else _cell(row[key]) for key in keys),
         )
         for row in found
     ]
