@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -41,8 +42,9 @@ from springline.runner.paper.runs import (
     with_velocities,
 )
 from springline.runner.report import PAGE, house_style
-from springline.runner.run import simulate
+from springline.runner.run import report_files, simulate
 from springline.runner.scenario import load_scenario, packaged_scenarios
+from springline.runner.version import __version__
 
 
 def seen(**overrides: Any) -> Measured:
@@ -449,6 +451,19 @@ def test_the_whole_report_has_all_figures_and_is_small(tmp_path: Path) -> None:
     text = reproduce(tmp_path / "out").report.read_text(encoding="utf-8")
     assert text.count("<svg viewBox=") == len(FIGURES) + len(OPEN_FIGURES)
     assert len(text.encode()) < 3_000_000
+
+
+def test_the_report_says_what_ran_so_that_it_can_be_run_again(done: Reproduction) -> None:
+    """The hash of each scenario is that of a run's own report; and nothing tells the machine or the day."""
+    text = (done.folder / "report.md").read_text(encoding="utf-8").partition("## Provenance")[2]
+    assert f"| springline | {__version__} |" in text
+    for case in cases([4]):
+        scenario = load_scenario(case.scenario, {"simulation.output_every": 2})
+        report = report_files(scenario, simulate(scenario), plot=False)["report.html"].decode()
+        (found,) = re.findall(rf"\| `{case.scenario}` \| `([0-9a-f]{{64}})` \| `[0-9a-f]{{16}}` \|", text)
+        assert f"<code>{found}</code>" in report
+    assert "simulation.output_every=2`" in text
+    assert str(done.folder) not in text and str(Path.home()) not in text and platform.node() not in text
 
 
 def test_the_report_of_a_group_says_what_it_saw(done: Reproduction) -> None:
