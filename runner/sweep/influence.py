@@ -117,7 +117,7 @@ def effects(runs: Runs) -> Figure:
         else:
             axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.margins(x=0.03)
-        axes.set_xlabel(runs.title(key))
+        runs.name(axes.xaxis, key)
     figure.align_ylabels()
     legend_above(figure, columns=4)
     return figure

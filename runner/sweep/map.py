@@ -56,9 +56,7 @@ def metric_map(runs: Runs, metric: str) -> Figure:
             _cover(axes, edges, (chatters > 0.5) & ~(ended > 0.5), **_HATCH)
             _scale_axes(runs, axes)
             axes.set_title(joint.name if len(runs.names) == 1 else f"{joint.name}, {runs.names[g]}", fontsize=8)
-            if g == shown - 1 or shown <= _ROOMY:
-                axes.set_xlabel(runs.title(runs.keys[0]))
-        grid[g, 0].set_ylabel(runs.title(runs.keys[1]))
+            _name_axes(runs, axes, below=g == shown - 1 or shown <= _ROOMY, beside=j == 0)
     for j, column in enumerate(columns[:1] if one_scale else columns):
         if np.any(np.isfinite(runs[column][runs.ok])):
             beside = grid if one_scale else grid[:, j]
@@ -111,10 +109,7 @@ def outcome_map(runs: Runs) -> Figure:
         _boundary(axes, edges, stopped, "stops beyond", "white", "black", linewidth=1.0, linestyle=(0, (3, 2)))
         _scale_axes(runs, axes)
         axes.set_title("" if len(runs.names) == 1 else runs.names[g], fontsize=8)
-        if g + width >= shown:
-            axes.set_xlabel(runs.title(runs.keys[0]))
-        if g % width == 0:
-            axes.set_ylabel(runs.title(runs.keys[1]))
+        _name_axes(runs, axes, below=g + width >= shown, beside=g % width == 0)
     assert mesh is not None
     bar = figure.colorbar(
         mesh, ax=grid.ravel().tolist(), label=f"chatter [1/s]; chattering above {CHATTERING:g}", shrink=0.8
@@ -142,6 +137,13 @@ def _scale_axes(runs: Runs, axes: Axes) -> None:
         scale("log" if runs.logarithmic[key] else "linear")
         if not runs.logarithmic[key]:
             axis.set_major_formatter(PLAIN)
+
+
+def _name_axes(runs: Runs, axes: Axes, *, below: bool, beside: bool) -> None:
+    """Say what the axes are, where there is room; their ticks have the prefix of those that say it."""
+    for key, axis, shown in zip(runs.keys, (axes.xaxis, axes.yaxis), (below, beside), strict=True):
+        runs.name(axis, key)
+        axis.label.set_visible(shown)
 
 
 def _of_group(runs: Runs, g: int) -> NDArray[np.bool_]:
