@@ -243,7 +243,8 @@ def _ranked(title: str, plan: Plan, summary: Summary, found: Sequence[Mapping[st
     """Runs with what varied and what came of them; nothing where there are none."""
     if not found:
         return []
-    keys, results = [axis.key for axis in plan.sweep.axes], _results(summary)
+    keys = [axis.key for axis in plan.sweep.axes if axis.kind != "tie"]  # "What was varied" tells the others
+    results = _results(summary)
     rows = [
         (
             str(row["run"]),
