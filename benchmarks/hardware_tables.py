@@ -99,7 +99,7 @@ def bits_rows(table: pa.Table) -> Rows:
 
 def mismatch_rows(table: pa.Table) -> Rows:
     """Settling time in s and steady-state error in mm and mrad, lift / rotation."""
-    heads = [f"payload {factor - 1:+.0%}, {force:g} N" for factor, force in MISMATCHES]
+    heads = [f"payload {_off(factor)}, {force:g} N" for factor, force in MISMATCHES]
     yield f"| controller | what | {' | '.join(heads)} |"
     yield "|---" * (2 + len(heads)) + "|"
     for name in CONTROLLERS:
@@ -115,6 +115,11 @@ def mismatch_rows(table: pa.Table) -> Rows:
                 pair = [factor * float(column(rows, f"{metric}_{joint}")[here][0]) for joint in ("lift", "rotation")]
                 cells.append(" / ".join("–" if np.isnan(value) else f"{value:#.2g}".rstrip(".") for value in pair))
             yield f"| {name} | {what} | {' | '.join(cells)} |"
+
+
+def _off(factor: float) -> str:
+    """How far a factor is off, in per cent with its sign."""
+    return f"{100 * (factor - 1):+.0f} %".replace("-", "−").replace("+0", "±0")
 
 
 TABLES: Mapping[str, tuple[Callable[[pa.Table], Rows], str]] = {

@@ -146,6 +146,24 @@ def test_every_public_name_is_in_the_reference(built: dict[Path, Page], site: Pa
 
 
 @pytest.mark.full
+def test_the_table_of_contents_begins_python_with_what_users_call(site: Path) -> None:
+    """Rooms stand below the package that they are of, not in one long list."""
+    text = (site / "index.html").read_text("utf-8").partition('<div class="sidebar-tree">')[2].partition("</aside>")[0]
+    python = text.partition(">Python</span>")[2]
+    face, _, rooms = python.partition(">Python, room by room</span>")
+    assert re.findall(r'href="([^"]+)"', face) == ["reference/python-springline.html"]
+    assert "load_scenario, simulate, analyze, batch" in face
+    assert re.findall(r'toctree-l1[^>]*><a[^>]*href="reference/python-springline\.(\w+)\.html"', rooms) == [
+        "runner",
+        "model",
+        "codegen",
+    ]
+    assert len(re.findall(r'toctree-l2"><a', rooms)) > 15
+    page = (site / "reference/python-springline.html").read_text("utf-8")
+    assert 'href="python-springline.runner.run.html#result"' in page
+
+
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("page", "shown"),
     [

@@ -137,11 +137,11 @@ def navigation(index: str) -> Iterator[str]:
             yield f"\n```{{toctree}}\n:hidden:\n:caption: {title}\n\n{entries}\n```\n"
 
 
-def orphan(pages: Path, listed: str) -> None:
+def orphan(pages: Path, listed: set[str]) -> None:
     """Tell Sphinx which pages are in no table of contents, and that this is meant."""
     for page in pages.rglob("*.md"):
         name = page.relative_to(pages).with_suffix("").as_posix()
-        if name != "index" and not re.search(rf"<{re.escape(name)}>", listed):
+        if name not in listed:
             page.write_text(f"---\norphan: true\n---\n{page.read_text(encoding='utf-8')}", encoding="utf-8")
 
 
@@ -162,7 +162,7 @@ def main() -> int:
     index = pages / "index.md"
     listed = "".join([*navigation(index.read_text(encoding="utf-8")), *reference.contents()])
     index.write_text(index.read_text(encoding="utf-8") + listed, encoding="utf-8")
-    orphan(pages, listed)
+    orphan(pages, {"index", *re.findall(r"^.* <(.+)>$", listed, re.MULTILINE), *reference.nested()})
     trees = out.parent / f"{out.name}-trees"
     shutil.rmtree(trees, ignore_errors=True)
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-c", HERE, "-d", trees, pages, out]

@@ -40,6 +40,28 @@ TITLES = {
     "c-api": "The C interface",
 }
 
+CALLED = (
+    "load_scenario",
+    "simulate",
+    "analyze",
+    "batch",
+    "to_pandas",
+    "to_polars",
+    "InputError",
+    "without_code",
+)
+"""The names of `springline` in the order in which a user meets them."""
+
+GIVEN = {
+    "load_scenario": ("springline.runner.scenario", "Scenario"),
+    "simulate": ("springline.runner.run", "Result"),
+    "analyze": ("springline.runner.analysis", "Analysis"),
+}
+"""Of what some of them give: the room and the class."""
+
+PACKAGES = ("springline.runner", "springline.model", "springline.codegen")
+"""The packages behind `springline`; each lists its rooms below it."""
+
 MEANINGS = {
     "mechanism.name": "the arm",
     "mechanism.n": "number of joints",
@@ -103,18 +125,34 @@ def pages() -> dict[str, str]:
         "columns.md": columns(),
         "c-api.md": c_api(),
     }
-    return made | {f"python-{name}.md": python_page(name) for name in doors()}
+    made |= {f"python-{name}.md": python_page(name) for name in doors()}
+    for package in PACKAGES:
+        page = f"python-{package}.md"
+        made[page] = made.get(page, python_head(package)) + rooms_of(package)
+    return made
 
 
 def contents() -> Iterator[str]:
-    """Hidden tables of contents of these pages."""
+    """Hidden tables of contents of these pages, but for those of `nested`."""
     listed = {
         "Reference": TITLES,
-        "Python": {f"python-{name}": name.removeprefix("springline.") for name in doors()},
+        "Python": {"python-springline": ", ".join(CALLED[:4]) + " …"},
+        "Python, room by room": {f"python-{name}": name.removeprefix("springline.") for name in PACKAGES},
     }
     for caption, entries in listed.items():
-        lines = "\n".join(f"{title} <reference/{name}>" for name, title in entries.items())
-        yield f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{lines}\n```\n"
+        places = {f"reference/{name}": title for name, title in entries.items()}
+        yield toctree(places, f":caption: {caption}\n")
+
+
+def nested() -> set[str]:
+    """The pages that stand in the table of contents of another one."""
+    return {f"reference/python-{name}" for package in PACKAGES for name in rooms(package)}
+
+
+def toctree(places: Mapping[str, str], options: str = "") -> str:
+    """A hidden table of contents: page -> title."""
+    lines = "\n".join(f"{title} <{place}>" for place, title in places.items())
+    return f"\n```{{toctree}}\n:hidden:\n{options}\n{lines}\n```\n"
 
 
 def table(titles: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -219,6 +257,8 @@ def section_part(name: str, section: Any, title: str, known: Mapping[str, str]) 
     rows = list(dict.fromkeys(rows))
     if not rows:
         return ""
+    if not any(default for _, _, default, _ in rows):
+        return f"\n## {title}\n\n{table(('key', 'value', 'meaning'), [(k, v, said) for k, v, _, said in rows])}"
     return f"\n## {title}\n\n{table(('key', 'value', 'default', 'meaning'), rows)}"
 
 
@@ -318,7 +358,7 @@ def doors() -> dict[str, dict[str, Any]]:
         found[module] = {
             name: getattr(room, name) for name in sorted(set(names), key=lambda name: (name.lower(), name))
         }
-    order = ("springline", "springline.runner", "springline.model", "springline.codegen")
+    order = ("springline", *PACKAGES)
     return dict(
         sorted(found.items(), key=lambda item: (item[0] != order[0], *(not item[0].startswith(o) for o in order[1:])))
     )
@@ -326,13 +366,56 @@ def doors() -> dict[str, dict[str, Any]]:
 
 def python_page(module: str) -> str:
     """What a room's door lets through, each name with its signature and docstring."""
-    room = importlib.import_module(module)
-    parts = [f"# {module}\n\n{escaped(inspect.getdoc(room) or '')}\n\n```{{py:currentmodule}} {module}\n```\n"]
-    for name, item in doors()[module].items():
+    parts, names = [python_head(module)], list(doors()[module])
+    if module == "springline":
+        parts.append(called())
+        names = [*CALLED, *(name for name in names if name not in CALLED)]
+    for name in names:
+        item = doors()[module][name]
         first = next(other for other, names in doors().items() if names.get(name) is item)
         seen = f"As [`{first}.{name}`](python-{first}.md#{name.lower()}).\n"
         parts.append(f"\n## `{name}`\n\n{entry(module, name, item) if first == module else seen}")
     return "".join(parts)
+
+
+def python_head(module: str) -> str:
+    """What a page of a module begins with: its name and its docstring."""
+    said = escaped(inspect.getdoc(importlib.import_module(module)) or "")
+    return f"# {module}\n\n{said}\n\n```{{py:currentmodule}} {module}\n```\n"
+
+
+def called() -> str:
+    """What users call, in the order in which they meet it, and what that gives. Raises KeyError for a name that is not
+    there, or that CALLED lacks.
+    """
+    names = doors()["springline"]
+    if set(CALLED) != set(names) - {"__version__"}:
+        raise KeyError(f"CALLED of {Path(__file__).name} is not what springline has: {sorted(names)}")
+    rows = []
+    for name in CALLED:
+        room, given = GIVEN.get(name, ("", ""))
+        link = f"[`{given}`](python-{room}.md#{given.lower()})" if given else ""
+        rows.append((f"[`sl.{name}`](#{name.lower()})", brief(names[name]), link))
+    return f"\n{table(('call', 'what it does', 'gives'), rows)}"
+
+
+def rooms(package: str) -> list[str]:
+    """The rooms of a package that have a door."""
+    return [name for name in doors() if name.startswith(f"{package}.")]
+
+
+def rooms_of(package: str) -> str:
+    """The rooms of a package: what each is for, and their pages below its own in the table of contents."""
+    within = rooms(package)
+    rows = [(f"[`{name}`](python-{name}.md)", brief(importlib.import_module(name))) for name in within]
+    listed = toctree({f"python-{name}": name.removeprefix(f"{package}.") for name in within})
+    return f"\n## Its rooms\n\n{table(('room', 'what it is for'), rows)}{listed}"
+
+
+def brief(item: Any) -> str:
+    """The first sentence of a docstring."""
+    first = (inspect.getdoc(item) or "").partition("\n\n")[0].replace("\n", " ")
+    return cell(re.split(r"(?<=\.)\s", first)[0])
 
 
 def entry(module: str, name: str, item: Any) -> str:
@@ -444,5 +527,5 @@ def escaped(text: str) -> str:
 
 def plain(text: str) -> str:
     """Signs that Markdown would take for its own, outside of code."""
-    parts = re.split(r"(`[^`]*`)", text)
+    parts = re.split(r"(``.*?``|`[^`]*`)", text)
     return "".join(part if part.startswith("`") else re.sub(r"([*_<\[\]|$#])", r"\\\1", part) for part in parts)

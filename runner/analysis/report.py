@@ -28,11 +28,13 @@ from springline.runner.report import (
     Table,
     Text,
     figure_files,
+    figure_text,
     house_style,
     provenance,
     shown_name,
     to_html,
     to_markdown,
+    unit_text,
 )
 from springline.runner.scenario import Scenario
 from springline.runner.version import __version__
@@ -136,9 +138,7 @@ def _chatter(scenario: Scenario, found: Analysis, names: Sequence[str]) -> list[
 
 
 def _shown(value: float | None) -> str:
-    if value is None or math.isnan(value):
-        return "–"
-    return "∞" if math.isinf(value) else f"{value:.3g}".replace("-", "−")
+    return "–" if value is None else figure_text(value, 3)
 
 
 def _figure_of(name: str, pictures: Sequence[Block]) -> str:
@@ -165,10 +165,10 @@ def _document(
     for row in found.rows:
         runs = [_shown(row.confirmed)] if confirmed else []
         text = row.text.rstrip(".") + _figure_of(row.name, pictures)
-        verdicts.append([f"`{row.name}`", _WORDS[row.ok], _shown(row.value), *runs, row.unit, text])
+        verdicts.append([f"`{row.name}`", _WORDS[row.ok], _shown(row.value), *runs, unit_text(row.unit), text])
     blocks: list[Block] = [
         Heading("Verdicts"),
-        Table(columns, verdicts, labels=len(columns)),
+        Table(columns, verdicts, labels=2, words=(len(columns) - 2, len(columns) - 1)),
         Bullets([*found.notes, *scenario.warnings]),
     ]
     if found.loop.elastic:
@@ -230,12 +230,14 @@ def _document(
         changed = [
             (
                 f"`{key}`",
-                keys[key].unit,
+                unit_text(keys[key].unit),
                 *(_shown(float(side[k])) for effect in moved.effects for side in (effect.low, effect.high)),
             )
             for k, key in enumerate(moved.keys)
         ]
-        now = "; ".join(f"{item.title} {_shown(item.nominal)} {item.unit}".rstrip() for item in moved.effects)
+        now = "; ".join(
+            f"{item.title} {_shown(item.nominal)} {unit_text(item.unit)}".rstrip() for item in moved.effects
+        )
         blocks += [Heading("Sensitivities"), Table(heads, changed, f"As it is: {now}.", labels=2)]
     blocks += [Heading("Figures"), *pictures]
     subtitle = (

@@ -23,6 +23,7 @@ from springline.runner.paper.evidence import Finding
 from springline.runner.paper.figures import FIGURES, OPEN_FIGURES, PaperFigure
 from springline.runner.paper.measured import Measured, first_time
 from springline.runner.paper.numbers import change, exact, number, plain
+from springline.runner.paper.provenance import provenance
 from springline.runner.paper.runs import (
     LAYERS,
     LIMITS,
@@ -59,6 +60,7 @@ def compose(study: Study, findings: Sequence[Finding], svg: Mapping[str, bytes])
         then what is left once it has settled.""")
     )
     blocks += _pictures(study, FIGURES, svg)
+    blocks += provenance(study)
     title = "Rapid robust control of a marine-vehicle manipulator: a reproduction"
     subtitle = """Y. Guo, S. Xu, H. Chen, H. Zheng, Z. Hao, Z. Wang, J. Mar. Sci. Eng. 2023, 11(3), 474,
         doi 10.3390/jmse11030474, repeated by springline from the paper's equations."""

@@ -73,7 +73,8 @@ def reproduce(
     force     replace a reproduction that has more than this one or was made with other overrides, and files that were
               edited since; write beside what others have put there
     progress  called now and then with the share that is done (0 .. 1)
-    The same springline gives the same bytes. An earlier reproduction of the same or of fewer groups is replaced.
+    The same springline and compiler give the same bytes. An earlier reproduction of the same or of fewer groups is
+    replaced.
     Raises FolderConflict if something else is in the way (nothing is written then), InputError for an override that
     cannot be, ValueError for a group that the paper does not have, ToolchainError if there is no C compiler.
     """

@@ -15,6 +15,7 @@ from .scale import quantity_text as quantity_text
 from .scale import unit_text as unit_text
 from .scenario_words import described as described
 from .scenario_words import provenance as provenance
+from .scenario_words import scenario_hash as scenario_hash
 from .scenario_words import shown_name as shown_name
 from .style import COLUMN as COLUMN
 from .style import LINES as LINES

@@ -5,7 +5,6 @@ In text, `code`, **strong**, [[badge]] and $TeX$ (a formula) are marked up; ever
 
 from __future__ import annotations
 
-import base64
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,12 +12,13 @@ from typing import ClassVar
 
 from springline.codegen.files import render
 from springline.runner.report.mathematics import to_inline, to_mathml, to_text
+from springline.runner.report.page_figures import PageFigures
 
 _SHORT = 24
 """Letters of a cell up to which its column's lines are not broken."""
 
-_LARGE = 200_000
-"""Bytes up to which an SVG is taken whatever its PNG is: it is sharp at any size."""
+_MANY = 8
+"""Columns from which on a table is set with less space between them."""
 
 _MARK = re.compile(r"(`[^`]+`|\*\*[^*]+\*\*|\[\[[^\]]+\]\]|\$[^$]+\$)")
 
@@ -82,6 +82,19 @@ class Table:
         above = [title for title, span in self.over for _ in range(span)] or [""] * len(self.columns)
         return [f"{a}: {b}" if a and b else a or b for a, b in zip(above, self.columns, strict=True)]
 
+    @property
+    def kinds(self) -> str:
+        """The table's classes in the page's style: "told" where its last column is sentences, which a narrow page sets
+        below the other cells; "dense" where there are many columns.
+        """
+        last = len(self.columns) - 1
+        told = not self.is_number(last) and any(len(_plain(cells[last])) > _SHORT for cells in self.rows)
+        return " ".join(filter(None, ("told" if told else "", "dense" if last >= _MANY else "")))
+
+    def beside(self, column: int) -> str:
+        """What a narrow page sets before a column's cells, which have no heading there; "" for nothing."""
+        return _plain(self.columns[column]) if "told" in self.kinds and self.is_number(column) else ""
+
     def is_number(self, column: int) -> bool:
         """Whether a column is set as numbers are."""
         return column >= self.labels and column not in self.words
@@ -99,23 +112,12 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A figure: its file without extension (relative to the document), its SVG, and what is seen in it.
-
-    png  the same as pixels; a page takes it in place of an SVG that is large (a scatter of many points)
-    """
+    """A figure: its file without extension (relative to the document), its SVG, and what is seen in it."""
 
     kind: ClassVar[str] = "picture"
     path: str
     svg: bytes
     caption: str
-    png: bytes = b""
-
-    @property
-    def source(self) -> str:
-        """The picture as a data: address, whichever form suits a page."""
-        pixels = len(self.svg) > _LARGE and 0 < len(self.png) < len(self.svg)
-        form, data = ("png", self.png) if pixels else ("svg+xml", self.svg)
-        return f"data:image/{form};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,13 +149,23 @@ def to_markdown(document: Document) -> str:
 
 
 def to_html(document: Document) -> str:
-    """The document as one HTML file: pictures and style inside, no script, nothing to fetch."""
+    """The document as one HTML file: pictures and style inside, no script, nothing to fetch.
+
+    Raises xml.etree.ElementTree.ParseError for a picture that is no SVG.
+    """
+    figures = PageFigures()
+    drawn = {
+        block.path: figures.put(block.svg, _plain(block.caption))
+        for block in document.blocks
+        if isinstance(block, Picture)
+    }
     return render(
         "springline.runner.report",
         "report.html.j2",
         document=document,
+        drawn=drawn,
+        figures=figures,
         pieces=_pieces,
-        plain=_plain,
         anchor=_anchor,
         formula=to_inline,
         mathml=to_mathml,

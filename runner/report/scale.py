@@ -31,8 +31,9 @@ def prefixed(unit: str, size: float) -> tuple[float, str]:
 
 
 def unit_text(unit: str) -> str:
-    """A unit for people: powers raised, a dot between factors."""
-    return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace(" ", " · ")
+    """A unit for people: powers raised, a dot between factors; of a number that any joint may have, "m or rad"."""
+    raised = unit.replace("^2", "²").replace("^3", "³")
+    return "" if unit == "1" else " or ".join(part.replace(" ", " · ") for part in raised.split(" or "))
 
 
 def figure_text(value: float, digits: int = 4) -> str:

@@ -55,14 +55,11 @@ def provenance(scenario: Scenario, others: Sequence[tuple[str, str]] = ()) -> li
 
     others  further rows: what, and its value
     """
-    names = {user.reference: f"{PurePath(user.path).name}:{user.name}" for user in scenario.code}
-    tables = {name: table["path"] for name, table in scenario.document.items() if "path" in table}
-    paths = {name: path if path.startswith("springline:") else PurePath(path).name for name, path in tables.items()}
-    text = portable_text(scenario, paths, names)
+    names = _code_names(scenario)
     rows = [
         ("springline", __version__),
         ("scenario", f"`{shown_name(scenario)}`"),
-        ("SHA-256 of the scenario below", f"`{hashlib.sha256(text.encode()).hexdigest()}`"),
+        ("SHA-256 of the scenario below", f"`{scenario_hash(scenario)}`"),
         *((f"SHA-256 of the code `{names[user.reference]}`", f"`{user.hash}`") for user in scenario.code),
     ]
     if scenario.noisy:
@@ -70,8 +67,25 @@ def provenance(scenario: Scenario, others: Sequence[tuple[str, str]] = ()) -> li
     return [
         Heading("Provenance"),
         Table(("", ""), [*rows, *others], labels=2),
-        Source("The scenario with every default filled in", text),
+        Source("The scenario with every default filled in", _resolved(scenario)),
     ]
+
+
+def scenario_hash(scenario: Scenario) -> str:
+    """SHA-256, as 64 hexadecimal digits, of a scenario with every default filled in; `provenance` shows both."""
+    return hashlib.sha256(_resolved(scenario).encode()).hexdigest()
+
+
+def _resolved(scenario: Scenario) -> str:
+    """The whole scenario as TOML, its files by their names alone."""
+    tables = {name: table["path"] for name, table in scenario.document.items() if "path" in table}
+    paths = {name: path if path.startswith("springline:") else PurePath(path).name for name, path in tables.items()}
+    return portable_text(scenario, paths, _code_names(scenario))
+
+
+def _code_names(scenario: Scenario) -> dict[str, str]:
+    """Reference to a user's class -> its file's name and its own."""
+    return {user.reference: f"{PurePath(user.path).name}:{user.name}" for user in scenario.code}
 
 
 def _row(name: str, text: str) -> list[tuple[str, str]]:

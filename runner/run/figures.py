@@ -37,7 +37,8 @@ from springline.runner.scenario import Scenario
 Floats = NDArray[np.float64]
 
 
-_POINTS = 2000  # of a scatter plot, and of a path in the phase plane
+_POINTS = 2000  # of a path in the phase plane
+_DOTS = 600  # of a scatter plot
 _CHECKED = 200  # rows at which the sliding surface is held against the run
 _GRID = 121  # points along each side of the plane in which the surface is sought
 _MOST_COLUMNS = 3  # side by side on a page, so that their numbers can be read
@@ -506,7 +507,7 @@ def _error_against_base(run: _Run) -> Drawn:
     blocks = -(-len(run.moving) // columns)
     figure, grid = panels(len(run.joints) * blocks, columns, width=PAGE, height=1.7, share_x=False)
     late = np.flatnonzero(run.settled)
-    late = late[:: max(1, len(late) // _POINTS)]
+    late = late[:: max(1, len(late) // _DOTS)]
     for j, joint in enumerate(run.joints):
         own = grid[j * blocks : (j + 1) * blocks]
         e = run[f"e_{joint.name}"][late]
@@ -514,7 +515,7 @@ def _error_against_base(run: _Run) -> Drawn:
             axes.remove()
         for axes, coordinate in zip(own.flat, run.moving, strict=False):
             b = run[coordinate.symbol][late]
-            axes.plot(b, e, ".", markersize=2, color=LINES[0]["color"], alpha=0.4, markeredgewidth=0, rasterized=True)
+            axes.plot(b, e, ".", markersize=2, color=LINES[0]["color"], alpha=0.4, markeredgewidth=0)
             axes.set_title(f"correlation {np.corrcoef(b, e)[0, 1]:+.2f}".replace("-", "−"), loc="right", fontsize=7)
             axes.margins(x=0.03)
             axes.xaxis.set_major_locator(MaxNLocator(4))

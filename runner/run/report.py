@@ -86,8 +86,7 @@ def report_files(
         for name, drawn in figures.items():
             made = figure_files(f"figures/{name}", drawn.figure)
             files |= made
-            svg, png = (made[f"figures/{name}.{form}"] for form in ("svg", "png"))
-            pictures.append(Picture(f"figures/{name}", svg, drawn.caption, png))
+            pictures.append(Picture(f"figures/{name}", made[f"figures/{name}.svg"], drawn.caption))
             if progress is not None:
                 progress(len(pictures) / len(figures))
     files[REPORT] = to_html(_document(scenario, result, pictures)).encode()

@@ -19,3 +19,4 @@ from .summary import summarize as summarize
 from .summary_page import summary_tables as summary_tables
 from .summary_page import write_summary as write_summary
 from .sweep_file import load_sweep as load_sweep
+from .work import kernel_identity as kernel_identity

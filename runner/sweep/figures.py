@@ -108,7 +108,7 @@ def _curve(runs: Runs) -> Figure:
             axes.set_xscale("log" if runs.logarithmic[key] else "linear")
             runs.name(axes.yaxis, column)
     for axes in grid[-1]:
-        axes.set_xlabel(runs.title(key))
+        runs.name(axes.xaxis, key)
     if len(runs.names) > 1 or runs.chattering.any():
         legend_above(figure)
     return figure
@@ -160,7 +160,9 @@ def _columns_of_curves(runs: Runs, split: list[tuple[str, str]]) -> Figure:
         axes.set_title(first.partition(" = ")[2], fontsize=8)
     for axes in grid[-1]:
         axes.set_xscale("log" if runs.logarithmic[key] else "linear")
-    figure.supxlabel(runs.title(key), fontsize=9)
+        runs.name(axes.xaxis, key)
+        axes.xaxis.label.set_visible(False)
+    figure.supxlabel(grid[-1, 0].get_xlabel(), fontsize=8)
     if not runs.ok.all():
         grid[0, 0].plot([], [], "x", color=STOPPED, label="stopped early")
     legend_above(figure, columns=4)

@@ -117,7 +117,7 @@ def effects(runs: Runs) -> Figure:
         else:
             axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.margins(x=0.03)
-        axes.set_xlabel(runs.title(key))
+        runs.name(axes.xaxis, key)
     figure.align_ylabels()
     legend_above(figure, columns=4)
     return figure
@@ -131,7 +131,7 @@ def _effect(runs: Runs, axes: Axes, key: str, metric: str, points: NDArray[np.bo
         chosen = (runs.group == g) & ok & np.isfinite(x) & np.isfinite(y)
         color = LINES[g]["color"]
         shown = chosen & points
-        axes.plot(x[shown], y[shown], ".", color=color, markersize=2.2, alpha=0.5, markeredgewidth=0, rasterized=True)
+        axes.plot(x[shown], y[shown], ".", color=color, markersize=2.2, alpha=0.5, markeredgewidth=0)
         at, bands = _running(x[chosen], y[chosen])
         if len(at) > 1:
             band = None if several else f"middle {100 * (_BAND[-1] - _BAND[0]):.0f} % of runs"
@@ -141,13 +141,7 @@ def _effect(runs: Runs, axes: Axes, key: str, metric: str, points: NDArray[np.bo
     stopped = ~ok & points & np.isfinite(x)
     if stopped.any():
         top = axes.get_xaxis_transform()
-        style: dict[str, Any] = {
-            "color": STOPPED,
-            "markersize": 2.5,
-            "transform": top,
-            "rasterized": True,
-            "clip_on": False,
-        }
+        style: dict[str, Any] = {"color": STOPPED, "markersize": 2.5, "transform": top, "clip_on": False}
         axes.plot(x[stopped], np.full(stopped.sum(), 1.0), "x", label="stopped early", **style)
 
 

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import PathPatch, Rectangle
+from matplotlib.path import Path
 from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import NDArray
 
@@ -22,7 +23,7 @@ _BINS = 40
 _SPAN = 1e3  # of a logarithmic scale at most: one perfect run must not take the colours from all others
 _ROOMY = 2  # rows of maps that leave room for a label below each
 _NEVER = "0.75"
-_HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": "white", "hatch": "//////", "linewidth": 0.0}
+_HATCH: Mapping[str, Any] = {"facecolor": "none", "edgecolor": "white", "hatch": "//////"}
 
 
 def metric_map(runs: Runs, metric: str) -> Figure:
@@ -48,16 +49,14 @@ def metric_map(runs: Runs, metric: str) -> Figure:
             ended = _binned(where, (~runs.ok[chosen]).astype(float), edges)
             known = _binned(where, np.where(runs.ok[chosen], runs[column][chosen], np.nan), edges)
             ok = _binned(where, runs.ok[chosen].astype(float), edges)
-            _shade(axes, edges, np.where(ok > 0, 1.0, np.nan), _NEVER)
+            _cover(axes, edges, ok > 0, facecolor=_NEVER)
             meshes[j] = axes.pcolormesh(*edges, known.T, norm=scales[j], cmap="viridis", rasterized=True)
-            _shade(axes, edges, np.where(ended > 0.5, 1.0, np.nan), STOPPED)
+            _cover(axes, edges, ended > 0.5, facecolor=STOPPED)
             chatters = _binned(where, np.where(runs.ok[chosen], runs.chattering[chosen], np.nan), edges)
-            _hatch(axes, edges, (chatters > 0.5) & ~(ended > 0.5))
+            _cover(axes, edges, (chatters > 0.5) & ~(ended > 0.5), **_HATCH)
             _scale_axes(runs, axes)
             axes.set_title(joint.name if len(runs.names) == 1 else f"{joint.name}, {runs.names[g]}", fontsize=8)
-            if g == shown - 1 or shown <= _ROOMY:
-                axes.set_xlabel(runs.title(runs.keys[0]))
-        grid[g, 0].set_ylabel(runs.title(runs.keys[1]))
+            _name_axes(runs, axes, below=g == shown - 1 or shown <= _ROOMY, beside=j == 0)
     for j, column in enumerate(columns[:1] if one_scale else columns):
         if np.any(np.isfinite(runs[column][runs.ok])):
             beside = grid if one_scale else grid[:, j]
@@ -77,7 +76,7 @@ def metric_map(runs: Runs, metric: str) -> Figure:
     for name, color in (*never, *stopped):
         grid[0, 0].plot([], [], "s", color=color, label=name)
     if runs.chattering.any():
-        style = {**_HATCH, "facecolor": "0.3"}
+        style = {**_HATCH, "facecolor": "0.3", "linewidth": 0.0}
         grid[0, 0].add_patch(Rectangle((np.nan, np.nan), 1, 1, label="chattering", **style))
     legend_above(figure)
     return figure
@@ -105,15 +104,12 @@ def outcome_map(runs: Runs) -> Figure:
         uneasy = _binned(where, (~runs.ok[chosen] | runs.chattering[chosen]).astype(float), edges) > 0.5
         chatter = _binned(where, np.where(runs.ok[chosen], np.maximum(worst[chosen], 1.0), np.nan), edges)
         mesh = axes.pcolormesh(*edges, chatter.T, norm=norm, cmap="cividis_r", rasterized=True)
-        _shade(axes, edges, np.where(stopped, 1.0, np.nan), STOPPED)
+        _cover(axes, edges, stopped, facecolor=STOPPED)
         _boundary(axes, edges, uneasy, "chatters beyond", "black", "white", linewidth=2.2)
         _boundary(axes, edges, stopped, "stops beyond", "white", "black", linewidth=1.0, linestyle=(0, (3, 2)))
         _scale_axes(runs, axes)
         axes.set_title("" if len(runs.names) == 1 else runs.names[g], fontsize=8)
-        if g + width >= shown:
-            axes.set_xlabel(runs.title(runs.keys[0]))
-        if g % width == 0:
-            axes.set_ylabel(runs.title(runs.keys[1]))
+        _name_axes(runs, axes, below=g + width >= shown, beside=g % width == 0)
     assert mesh is not None
     bar = figure.colorbar(
         mesh, ax=grid.ravel().tolist(), label=f"chatter [1/s]; chattering above {CHATTERING:g}", shrink=0.8
@@ -141,6 +137,13 @@ def _scale_axes(runs: Runs, axes: Axes) -> None:
         scale("log" if runs.logarithmic[key] else "linear")
         if not runs.logarithmic[key]:
             axis.set_major_formatter(PLAIN)
+
+
+def _name_axes(runs: Runs, axes: Axes, *, below: bool, beside: bool) -> None:
+    """Say what the axes are, where there is room; their ticks have the prefix of those that say it."""
+    for key, axis, shown in zip(runs.keys, (axes.xaxis, axes.yaxis), (below, beside), strict=True):
+        runs.name(axis, key)
+        axis.label.set_visible(shown)
 
 
 def _of_group(runs: Runs, g: int) -> NDArray[np.bool_]:
@@ -202,14 +205,15 @@ def _binned(where: Sequence[NDArray[np.int64]], values: Floats, edges: Sequence[
     return np.asarray(mean.reshape(shape), dtype=np.float64)
 
 
-def _shade(axes: Axes, edges: Sequence[Floats], where: Floats, color: str) -> None:
-    axes.pcolormesh(*edges, where.T, cmap=ListedColormap([color]), rasterized=True)
-
-
-def _hatch(axes: Axes, edges: Sequence[Floats], where: NDArray[np.bool_]) -> None:
-    """Hatch these cells, each run of neighbours along y as one, for the lines to go through."""
+def _cover(axes: Axes, edges: Sequence[Floats], where: NDArray[np.bool_], **style: Any) -> None:
+    """Cover these cells with one patch, in which no seams are seen and hatches go through."""
+    boxes = []
     for i, column in enumerate(where):
         borders = np.flatnonzero(np.diff(np.concatenate([[0], column, [0]])))
         for low, high in borders.reshape(-1, 2):
-            left, right, bottom, top = edges[0][i], edges[0][i + 1], edges[1][low], edges[1][high]
-            axes.add_patch(Rectangle((left, bottom), right - left, top - bottom, **_HATCH))
+            (left, right), (bottom, top) = edges[0][i : i + 2], edges[1][[low, high]]
+            boxes.append(
+                Path([(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)], closed=True)
+            )
+    if boxes:
+        axes.add_patch(PathPatch(Path.make_compound_path(*boxes), linewidth=0.0, **style))

@@ -116,7 +116,7 @@ def _write_figures(plan: Plan, dataset: Dataset, summary: Summary) -> list[Pictu
         files = figure_files(name, figure)
         for file, content in files.items():
             dataset.place.write(file, content)
-        pictures.append(Picture(name, files[f"{name}.svg"], said[name], files[f"{name}.png"]))
+        pictures.append(Picture(name, files[f"{name}.svg"], said[name]))
     return pictures
 
 
@@ -133,7 +133,7 @@ def _document(plan: Plan, summary: Summary, pictures: Sequence[Picture]) -> Docu
         Text(_headline(summary)),
         Table(outcomes, rows),
         Text(
-            f"A run chatters where `chatter_` of a joint is above {CHATTERING:g} 1/s: its command swings so often that "
+            f"A run chatters where a joint's `chatter` is above {CHATTERING:g} 1/s: its command swings so often that "
             "its other metrics say little."
         ),
         Heading("Best and worst runs"),
@@ -243,14 +243,15 @@ def _ranked(title: str, plan: Plan, summary: Summary, found: Sequence[Mapping[st
     """Runs with what varied and what came of them; nothing where there are none."""
     if not found:
         return []
-    keys, results = [axis.key for axis in plan.sweep.axes], _results(summary)
+    keys = [axis.key for axis in plan.sweep.axes if axis.kind != "tie"]  # "What was varied" tells the others
+    results = _results(summary)
     rows = [
         (
             str(row["run"]),
             f"[[{_ended(row, plan)}]]",
             quantity_text(row["t_end"], "s"),
             *(quantity_text(row[name], summary.units[name]) for name in results),
-            *(_cell(row[key]) for key in keys),
+            *(figure_text(row[key], 6) if isinstance(row[key], float) else _cell(row[key]) for key in keys),
         )
         for row in found
     ]

@@ -135,6 +135,11 @@ def work_for(scenario: Scenario, columns: Mapping[str, Floats]) -> Work:
     return Work(spec, loop_settings(scenario, trajectory=True), tuple(kernel_tables(scenario.tables())))
 
 
+def kernel_identity(scenario: Scenario) -> str:
+    """`Work.identity` of the kernel that simulates a scenario by itself, in which every number is tunable."""
+    return _emitted(KernelSpec(kernel_structure(scenario), scenario.control_every > 0))[0]
+
+
 @dataclass(frozen=True)
 class Outcome:
     """Results of a chunk: the Runs of all, and of each kept run its trajectory (rows, columns)."""

@@ -5,9 +5,9 @@ Numbers "seen" come from an independent simulation of the same equations, with R
 
 from __future__ import annotations
 
-import base64
 import json
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -42,8 +42,9 @@ from springline.runner.paper.runs import (
     with_velocities,
 )
 from springline.runner.report import PAGE, house_style
-from springline.runner.run import simulate
+from springline.runner.run import report_files, simulate
 from springline.runner.scenario import load_scenario, packaged_scenarios
+from springline.runner.version import __version__
 
 
 def seen(**overrides: Any) -> Measured:
@@ -436,15 +437,33 @@ def test_the_html_report_needs_nothing_else(done: Reproduction) -> None:
     text = done.report.read_text(encoding="utf-8")
     page = Page(text)
     assert page.open == []
-    assert len(page.sources) == 4
-    for source in page.sources:
-        head, _, data = source.partition(",")
-        assert head == "data:image/svg+xml;base64"
-        assert base64.b64decode(data).lstrip().startswith(b"<?xml")
+    assert not page.sources
+    assert text.count("<svg viewBox=") == 4
     assert all(target.removeprefix("#") in page.anchors for target in page.targets)
     assert len(page.anchors) == len(set(page.anchors))
-    assert "url(" not in text
+    assert all(target in page.anchors for target in re.findall(r"url\(#?([^)]*)\)", text))
     assert "prefers-color-scheme: dark" in text
+    assert len(text) < 400_000  # with the largest four of 25 figures; all are to have less than 3 MB
+
+
+@pytest.mark.full
+def test_the_whole_report_has_all_figures_and_is_small(tmp_path: Path) -> None:
+    text = reproduce(tmp_path / "out").report.read_text(encoding="utf-8")
+    assert text.count("<svg viewBox=") == len(FIGURES) + len(OPEN_FIGURES)
+    assert len(text.encode()) < 3_000_000
+
+
+def test_the_report_says_what_ran_so_that_it_can_be_run_again(done: Reproduction) -> None:
+    """The hash of each scenario is that of a run's own report; and nothing tells the machine or the day."""
+    text = (done.folder / "report.md").read_text(encoding="utf-8").partition("## Provenance")[2]
+    assert f"| springline | {__version__} |" in text
+    for case in cases([4]):
+        scenario = load_scenario(case.scenario, {"simulation.output_every": 2})
+        report = report_files(scenario, simulate(scenario), plot=False)["report.html"].decode()
+        (found,) = re.findall(rf"\| `{case.scenario}` \| `([0-9a-f]{{64}})` \| `[0-9a-f]{{16}}` \|", text)
+        assert f"<code>{found}</code>" in report
+    assert "simulation.output_every=2`" in text
+    assert str(done.folder) not in text and str(Path.home()) not in text and platform.node() not in text
 
 
 def test_the_report_of_a_group_says_what_it_saw(done: Reproduction) -> None:
@@ -510,9 +529,12 @@ def test_given_numbers_have_no_zeros_at_the_end(value: float, text: str) -> None
     assert exact(value) == text
 
 
+_EMPTY = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
+
+
 def test_the_base_motion_of_a_group_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A shake was once reported as none, when its coordinate was given another name."""
-    monkeypatch.setattr(reproduction, "figure_files", lambda name, _: {f"{name}.svg": b"<svg/>", f"{name}.png": b""})
+    monkeypatch.setattr(reproduction, "figure_files", lambda name, _: {f"{name}.svg": _EMPTY, f"{name}.png": b""})
     reproduce(tmp_path / "out", [1], overrides={"simulation.duration": 0.5})
     text = (tmp_path / "out/report.md").read_text(encoding="utf-8")
     assert "shake of group 1): shake (1.5 sin(1.5t) + 0.03 sin(10t)) m" in text

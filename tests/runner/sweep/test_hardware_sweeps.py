@@ -92,7 +92,7 @@ def test_periods_and_delays_are_axes_of_the_maps(swept: Any) -> None:
     figures = summary_figures(plan, summary)
     assert list(figures) == ["map", "error_map", "outcomes"]
     axes, bar = figures["outcomes"].axes
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("period [s]", "delay [s]")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("period [ms]", "delay [ms]")
     assert f"chattering above {CHATTERING:g}" in bar.get_ylabel()
     named = [line.get_label() for line in axes.lines]
     assert {"chatters beyond", "stops beyond", "stopped early"} <= set(named)
