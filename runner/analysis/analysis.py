@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,7 @@ class Row:
         return asdict(self)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Analysis:
     """What was found of one scenario.
 
@@ -87,6 +88,22 @@ class Analysis:
     cycle: LimitCycle | None
     proof: Proof | None
     damping: float
+
+    def __repr__(self) -> str:
+        """Status, and which verdicts say no."""
+        failed = ", ".join(row.name for row in self.rows if row.ok is False)
+        return f"Analysis({self.status}, {len(self.rows)} rows{': no to ' + failed if failed else ''})"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: every row, the number with its unit, and what it means here."""
+        said = {True: "yes", False: "no", None: ""}
+        rows = [
+            (row.name, "–" if row.value is None else _number(row.value, row.unit), said[row.ok], row.text)
+            for row in self.rows
+        ]
+        cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows)
+        notes = "".join(f"<p>{escape(note)}</p>" for note in self.notes)
+        return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>{notes}"
 
     def row(self, name: str) -> Row:
         """The verdict of a name; KeyError if there is none."""

@@ -52,7 +52,7 @@ Slots = dict[str, float | Floats]
 """Slot key -> one number for all runs, or a column (runs,) of them."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Scenario:
     """A scenario with every default filled in; immutable.
 
@@ -72,6 +72,9 @@ class Scenario:
     signal_tables: tuple[Spline, ...]
     notes: tuple[str, ...] = ()
     code: tuple[UserClass, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"Scenario({self.source!r})"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scenario) and self._identity == other._identity

@@ -1,7 +1,6 @@
 """The face of the analysis: verdicts with their numbers, in words, confirmed by runs, and wrong use told at once."""
 
-from __future__ import annotations
-
+import html
 import json
 from functools import cache
 from pathlib import Path
@@ -65,6 +64,18 @@ def test_a_delta_that_is_too_small_is_called_unstable() -> None:
         assert found.row(name).ok is False
         assert "unstable" in found.row(name).text
     assert found.row("delta_critical").value == pytest.approx(value(confirmed(), "delta_critical"))
+
+
+def test_people_see_a_line_and_notebooks_a_table() -> None:
+    found = analysed(control__delta=0.02)
+    failed = [row.name for row in found.rows if row.ok is False]
+    assert repr(found) == f"Analysis(unstable, {len(found.rows)} rows: no to {', '.join(failed)})"
+    assert "delta_critical" in failed
+    page = found._repr_html_()
+    assert page.count("<tr>") == len(found.rows)
+    assert f"<td>delta_critical</td><td>{found.row('delta_critical').value:.3g} m or rad</td><td>no</td>" in page
+    assert all(html.escape(row.text) in page for row in found.rows)
+    assert repr(found.scenario) == "Scenario('paper/nominal')"
 
 
 def test_without_fast_control_no_delta_is_stable() -> None:
