@@ -45,6 +45,9 @@ ELSEWHERE = {
 }
 """Commands that are not run here, and why not."""
 
+EMPTY = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
+"""In place of a figure, for what is not about figures."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -115,7 +118,7 @@ def shorten(monkeypatch: pytest.MonkeyPatch) -> None:
 
     # tests/runner/run/test_plots.py looks at the figures, whose drawing would take most of the time.
     def files(name: str, _: Figure) -> dict[str, bytes]:
-        return {f"{name}.png": b"", f"{name}.svg": b""}
+        return {f"{name}.png": b"", f"{name}.svg": EMPTY}
 
     monkeypatch.setattr("springline.runner.report.figure_files", files)
     monkeypatch.setattr("springline.runner.sweep.load_sweep", swept)
@@ -261,7 +264,7 @@ def test_a_page_s_commands_print_what_it_shows(
     require_tool("cc")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(
-        "springline.runner.report.figure_files", lambda name, _: {f"{name}.png": b"", f"{name}.svg": b""}
+        "springline.runner.report.figure_files", lambda name, _: {f"{name}.png": b"", f"{name}.svg": EMPTY}
     )
     printed = ""
     for block in blocks(page):
