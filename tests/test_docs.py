@@ -47,6 +47,9 @@ ELSEWHERE = {
 }
 """Commands that are not run here, and why not."""
 
+EMPTY = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
+"""In place of a figure, for what is not about figures."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -117,7 +120,7 @@ def shorten(monkeypatch: pytest.MonkeyPatch) -> None:
 
     # tests/runner/run/test_plots.py looks at the figures, whose drawing would take most of the time.
     def files(name: str, _: Figure) -> dict[str, bytes]:
-        return {f"{name}.png": b"", f"{name}.svg": b""}
+        return {f"{name}.png": b"", f"{name}.svg": EMPTY}
 
     monkeypatch.setattr("springline.runner.report.figure_files", files)
     monkeypatch.setattr("springline.runner.sweep.load_sweep", swept)
@@ -265,7 +268,7 @@ def test_a_page_s_commands_print_what_it_shows(
     if "springline cache clear" in page.read_text("utf-8"):
         monkeypatch.setenv("SPRINGLINE_CACHE", str(tmp_path / "cache"))  # not the one that all tests share
     monkeypatch.setattr(
-        "springline.runner.report.figure_files", lambda name, _: {f"{name}.png": b"", f"{name}.svg": b""}
+        "springline.runner.report.figure_files", lambda name, _: {f"{name}.png": b"", f"{name}.svg": EMPTY}
     )
     printed = ""
     for block in blocks(page):
