@@ -8,7 +8,6 @@ for every row is a structure, and so a kernel, of its own.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -16,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from springline.model.control import CONTROLLERS
-from springline.runner.report import put
+from springline.runner.report import asked_to_write, put
 from springline.runner.run import Result, simulate
 from springline.runner.scenario import Scenario, load_scenario
 
@@ -101,11 +100,7 @@ def rows() -> Iterator[str]:
 
 def main() -> int:
     """Command line; the exit code is 2 where there is no page to write."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="put the table into docs/controllers.md")
-    write = parser.parse_args().write
-    if write and not PAGE.is_file():
-        parser.error(f"there is no {PAGE}: run it in a checkout")
+    write = asked_to_write(__doc__, "the table", PAGE)
     table = ""
     for row in rows():
         table += f"{row}\n"

@@ -8,7 +8,6 @@ docs/images/first.png, which takes about a minute.
 
 from __future__ import annotations
 
-import argparse
 import io
 import sys
 from collections.abc import Sequence
@@ -24,7 +23,7 @@ from numpy.typing import NDArray
 
 from springline.runner import batch, load_scenario, simulate
 from springline.runner.analysis import delta_critical
-from springline.runner.report import house_style
+from springline.runner.report import asked_to_write, house_style
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "first.png"
 
@@ -204,11 +203,7 @@ def _stability(axes: Axes) -> None:
 
 def main() -> int:
     """Command line; the exit code is 2 where there is no folder for pictures."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="put the picture into docs/images/")
-    write = parser.parse_args().write
-    if write and not PICTURE.parent.is_dir():
-        parser.error(f"there is no {PICTURE.parent}: run it in a checkout")
+    write = asked_to_write(__doc__, "the picture", PICTURE.parent)
     file = io.BytesIO()
     figure().savefig(file, format="png", dpi=150, metadata={"Software": None})
     sys.stdout.write(f"{PICTURE.name}: {len(file.getvalue())} bytes\n")

@@ -8,7 +8,6 @@ comments that name them, and the pictures, as `springline batch` draws them, int
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from springline.benchmarks.sweep_pictures import run_whole
 from springline.codegen.kernel import CHATTERING
 from springline.model.control import CONTROLLERS
-from springline.runner.report import put
+from springline.runner.report import asked_to_write, put
 from springline.runner.sweep import read_dataset
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -139,11 +138,7 @@ def answer(name: str, folder: Path) -> tuple[str, bytes]:
 
 def main() -> int:
     """Command line; the exit code is 2 where there is no page to write."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="put tables and pictures into docs/")
-    write = parser.parse_args().write
-    if write and not PAGE.is_file():
-        parser.error(f"there is no {PAGE}: run it in a checkout")
+    write = asked_to_write(__doc__, "tables and their pictures", PAGE)
     for name in TABLES:
         with tempfile.TemporaryDirectory() as folder:
             table, picture = answer(name, Path(folder) / name)

@@ -7,12 +7,12 @@ Runs each sweep in a folder of its own; --write (`make docs-sweeps`) puts its pi
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
+from springline.runner.report import asked_to_write
 from springline.runner.sweep import (
     Dataset,
     Plan,
@@ -50,11 +50,7 @@ def run_whole(name: str, folder: Path) -> None:
 
 def main() -> int:
     """Command line; the exit code is 2 where there is no folder for pictures."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="put the pictures into docs/images/")
-    write = parser.parse_args().write
-    if write and not IMAGES.is_dir():
-        parser.error(f"there is no {IMAGES}: run it in a checkout")
+    write = asked_to_write(__doc__, "the pictures", IMAGES)
     for name in SHOWN:
         with tempfile.TemporaryDirectory() as folder:
             run_whole(name, Path(folder) / name)

@@ -1,4 +1,5 @@
-from .docs_tables import put as put
+from .docs_pages import asked_to_write as asked_to_write
+from .docs_pages import put as put
 from .document import Block as Block
 from .document import Bullets as Bullets
 from .document import Document as Document

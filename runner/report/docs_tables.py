@@ -9,7 +9,6 @@ text around them is written by hand.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -21,21 +20,9 @@ from springline.model.parameters import Joint, Parameter
 from springline.model.quantities import Quantity
 from springline.model.structure import SignalShape, Structure
 from springline.model.system import System
+from springline.runner.report.docs_pages import asked_to_write, put
 
 SCENARIOS_PAGE = Path(__file__).parents[2] / "docs" / "scenarios.md"
-
-
-def put(page: str, name: str, table: str) -> str:
-    """`page` with `table` (lines that end in a newline) between the comments "name: begin" and "name: end".
-
-    Raises ValueError if the page does not have these two comments, in this order.
-    """
-    begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->\n"
-    before, found, rest = page.partition(begin)
-    _, closed, after = rest.partition(end)
-    if not (found and closed):
-        raise ValueError(f"no place for the table {name!r}: expected {begin.strip()} and, below it, {end.strip()}")
-    return before + begin + table + end + after
 
 
 def table(quantities: Iterable[Quantity], joints: Sequence[Joint]) -> str:
@@ -85,14 +72,10 @@ def written(page: str) -> str:
 
 def main() -> int:
     """Command line; the exit code is 2 where there is no page to write."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="put the tables into docs/scenarios.md")
-    if not parser.parse_args().write:
+    if asked_to_write(__doc__, "the tables", SCENARIOS_PAGE):
+        SCENARIOS_PAGE.write_text(written(SCENARIOS_PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    else:
         sys.stdout.write("\n".join(tables().values()))
-        return 0
-    if not SCENARIOS_PAGE.is_file():
-        parser.error(f"there is no {SCENARIOS_PAGE}: run it in a checkout")
-    SCENARIOS_PAGE.write_text(written(SCENARIOS_PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     return 0
 
 
