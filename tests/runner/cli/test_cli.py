@@ -914,7 +914,7 @@ def test_list_parameters_of_a_scenario_has_those_of_its_classes(elsewhere: Path)
     every = load_scenario("own.toml").numeric_keys()
     split = [key.rpartition(".") for key in every]
     missing = {stem if last.isdigit() else f"{stem}.{last}" for stem, _, last in split} - rows.keys()
-    assert all(key.startswith(("plant.", "reference.", "initial.")) for key in missing), missing
+    assert all(key.startswith(("plant.", "reference.", "initial.", "simulation.")) for key in missing), missing
     assert "--no-code refuses that" in refused("list", "parameters", "own.toml", "--no-code")
 
 
