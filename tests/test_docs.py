@@ -41,6 +41,9 @@ ELSEWHERE = {
     "springline --install-completion": "changes a shell; tests/runner/cli/test_completion.py types in one",
     "make reproduce": "minutes; tests/runner/paper/test_paper.py reproduces a group",
     "make test": "this very test among them",
+    "python examples/identify_table4.py --heave 0.64 --step 4e-4 --seeds 1 --population 128 --generations 250": (
+        "minutes; tests/test_examples.py searches for shorter"
+    ),
     "make -C examples/equal_bits host": "tests/runner/test_reproducible_chatter.py does",
     "make -C examples/equal_bits aarch64 SAMPLES=10000": "tests/runner/test_reproducible_chatter.py does",
     "make -C ../cortex_m m7 EXPORT=$PWD/adrc_c BUILD=$PWD/adrc_m7": "tests/test_examples.py runs the README",

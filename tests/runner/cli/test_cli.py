@@ -630,6 +630,7 @@ def test_a_full_disk_is_one_sentence_and_no_folder(monkeypatch: pytest.MonkeyPat
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
 
+    done("run", "short.toml", "-o", "before", "--no-plot")  # its kernel is there, which a full disk would not hold
     monkeypatch.setattr(os, "fsync", full)
     assert (
         refused("run", "short.toml", "-o", "out", "--no-plot", code=1) == "Error: [Errno 28] No space left on device\n"
