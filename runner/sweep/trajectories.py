@@ -10,7 +10,7 @@ import pyarrow as pa
 from numpy.typing import ArrayLike, NDArray
 
 from springline.model.system import System
-from springline.runner.files import arrow_numbers
+from springline.runner.files import arrow_array, arrow_numbers
 from springline.runner.run import metrics_schema, trajectory_schema
 from springline.runner.scenario import expect_keys
 
@@ -88,15 +88,17 @@ class Trajectories:
             name: np.concatenate([part[name] for part in self._reduced])
             for name in (self._reduced[0] if self._reduced else ())
         }
-        return pa.table({name: pa.array(values, from_pandas=True) for name, values in found.items()})
+        return pa.table({
+            name: arrow_array(values, pa.from_numpy_dtype(values.dtype), null=True) for name, values in found.items()
+        })  # fmt: skip
 
     def kept(self) -> pa.Table:
         """A list in each column of a trajectory, null for runs of which none is kept."""
         if not self.keep:
             return pa.table({})
         lengths = [len(self._kept.get(run, ())) for run in range(self.runs)]
-        ends = pa.array(np.cumsum([0, *lengths]), pa.int64())
-        absent = pa.array([run not in self._kept for run in range(self.runs)])
+        ends = arrow_array(np.cumsum([0, *lengths]), pa.int64())
+        absent = arrow_array([run not in self._kept for run in range(self.runs)], pa.bool_())
         rows = np.concatenate(list(self._kept.values()))
         lists = [pa.LargeListArray.from_arrays(ends, arrow_numbers(column), mask=absent) for column in rows.T]
         fields = [entry.with_type(pa.large_list(pa.float64())) for entry in trajectory_schema(self.system)]
