@@ -256,7 +256,8 @@ def _error(run: _Run) -> Drawn:
         for (band, limit), shade in ((response, "0.90"), (settling, "0.78")):
             half = band * start + limit
             if half:
-                name = f"±{100 * band:g} % of |{symbol(E)}(0)|" if band else f"±{limit:g} {joint.unit}"
+                share = f"±{100 * band:.4g} % of |{symbol(E)}(0)|"
+                name = share if band else f"±{quantity_text(limit, joint.unit)}"
                 axes.axhspan(-half, half, color=shade, linewidth=0, label=name)
         draw(axes, t[part.rows], e[part.rows], "error", **LINES[0])
         for metric, name, mark in (("response_time", "response time", "o"), ("settling_time", "settling time", "s")):

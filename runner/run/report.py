@@ -151,7 +151,7 @@ def _settling(run: _Numbers, joint: Joint) -> Verdict:
     if scenario.settling_error:
         band, of = scenario.settling_error, ""
     else:
-        band, of = scenario.settling_band * start, f" ({100 * scenario.settling_band:g} % of its initial error)"
+        band, of = scenario.settling_band * start, f" ({100 * scenario.settling_band:.4g} % of its initial error)"
     size = f"{quantity_text(band, joint.unit)}{of}"
     at = run.metric("settling_time", joint)
     what = f"{joint.name}: error"

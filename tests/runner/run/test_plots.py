@@ -164,3 +164,13 @@ def test_the_same_run_gives_the_same_bytes_whatever_the_users_settings(at_rest: 
         assert mpl.rcParams["font.size"] == 30
     assert first["tracking.png"].startswith(b"\x89PNG")
     assert b"<svg" in first["tracking.svg"] and b"dc:date" not in first["tracking.svg"]
+
+
+def test_bands_are_named_as_they_are_read() -> None:
+    """What a sweep draws has sixteen digits; a legend has four, with a prefix."""
+    scenario = load_scenario("paper/nominal", {
+        "simulation.duration": 0.5, "simulation.settling_error": 0.09340437, "simulation.response_band": 0.27071234,
+    })  # fmt: skip
+    figure = run_figures(scenario, simulate(scenario))["error"]
+    names = {text.get_text() for legend in figure.legends for text in legend.get_texts()}
+    assert {"±27.07 % of |e(0)|", "±93.4 mm", "±93.4 mrad"} <= names
